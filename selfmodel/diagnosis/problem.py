@@ -186,7 +186,7 @@ class Problem:
     def _repeated(self) -> list[TrialPart]:
         """Healthy trials whose movements those to explain repeat; none if one repeats none."""
         is_repeated = [
-            [self._is_comparable and repeats(part.trial, own.trial) for own in self.healthy_trials]
+            [self._is_comparable and _repeats(part.trial, own.trial) for own in self.healthy_trials]
             for part in self.trials
         ]
         every = [*zip(self._observed, *is_repeated, strict=True)]
@@ -266,7 +266,7 @@ class Problem:
         ]
 
 
-def repeats(one: Trial, other: Trial) -> bool:
+def _repeats(one: Trial, other: Trial) -> bool:
     """Returns whether a trial has the commands of another at all its steps; see SAME_MOVEMENT."""
     commands, repeated = one.trajectory["commands"], other.trajectory["commands"]
     steps = min(len(commands), len(repeated))

@@ -176,11 +176,11 @@ def gain_exceeds_healthy_gain(
     """
     if not (is_gain(one, other) and _are_comparable(healthy_one, healthy_other)):
         return False
-    gain, more, error = _gains(one, other, healthy_one, healthy_other)
+    gain, more, _ = _gains(one, other, healthy_one, healthy_other)
     is_large = gain - more >= MIN_HEALTHY_SHARE * gain
     if is_large and is_better(healthy_one, healthy_other):
         return False
-    return more >= MIN_Z_ACROSS_TRIALS * error
+    return contrast(one, other, healthy_one, healthy_other) >= MIN_Z_ACROSS_TRIALS
 
 
 def contrast(

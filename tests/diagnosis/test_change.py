@@ -14,11 +14,19 @@ from selfmodel.comparators import (
     segment_prediction,
 )
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.diagnose import DiagnosticSearch, Split, best_split, change_at, is_change
+from selfmodel.diagnosis.diagnose import (
+    DiagnosticSearch,
+    Split,
+    best_split,
+    change_at,
+    is_better_than_always,
+    is_change,
+)
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.losses import LossFunction as Losses, LossTable, Timeline
 from selfmodel.diagnosis.significance import MIN_PIECES, MIN_Z_OF_CHANGE
-from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
@@ -28,6 +36,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
+from tests.diagnosis.synthetic import Synthetic
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import trial_of
 
@@ -125,6 +134,20 @@ def test_a_hypothesis_that_is_no_better_after_than_before_is_no_change():
 
     assert is_change(Split(INTACT, JAM, 30), INTACT, of(rows))
     assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+@pytest.mark.parametrize(("together", "expected"), [(0.1, False), (0.9, True)])
+def test_a_change_of_a_long_trial_has_to_beat_the_faults_of_both_sides_together(
+    together: float,
+    expected: bool,  # noqa: FBT001  # what is expected
+):
+    early, ripple = np.arange(PIECES) < 30, np.linspace(0.0, 0.01, PIECES)
+    both = canonical([*BREAK.faults, *JAM.faults], ANATOMY)
+    rows = {JAM: np.where(early, 0.1, 1.0), BREAK: np.where(early, 1.0, 0.1)}
+    losses = of({one: row + ripple for one, row in {**rows, both: together}.items()})
+    problem = Synthetic(HypothesisSpace(ANATOMY, PAPER_KINDS), losses)
+
+    assert is_better_than_always(Split(JAM, BREAK, 30), problem) == expected
 
 
 @pytest.mark.parametrize(("z", "expected"), [(1.01, True), (0.99, False)])

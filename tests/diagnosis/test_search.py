@@ -127,6 +127,28 @@ def test_a_fault_that_alone_is_far_worse_than_none_is_not_tried_beside_another()
     assert not any(set(hopeless.faults) & set(one.faults) for one in beside)
 
 
+def test_the_severity_of_a_long_trial_is_fitted_by_the_surrogate_alone():
+    space, ripple = HypothesisSpace(ANATOMY, (FRICTION,)), np.linspace(-0.01, 0.01, PIECES)
+    found, compared = [], []
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        compared[-1].update(hypotheses)
+        return coarse(hypotheses)
+
+    def coarse(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        severities = [one.faults[0].severity if len(one) else 1.5 for one in hypotheses]
+        return np.array([(0.1 + abs(one - 0.53)) * (1 + ripple) for one in severities])
+
+    for is_long in (False, True):
+        compared.append(set[Hypothesis]())
+        problem = Synthetic(space, losses, coarse=coarse)
+        problem.is_long = is_long
+        found.append(LocalSearch(problem).refined([]).faults[0].severity)
+
+    assert found == pytest.approx([0.53, 0.53], abs=0.005)
+    assert len(compared[1]) < len(compared[0])
+
+
 def helped(swing: float) -> Losses:
     """Losses with a broken knee as the truth; a failed sensor lowers them by a noisy gain."""
     knee, helper = said("break:front_left_knee"), said("sensor:front_right_touch").faults[0]
