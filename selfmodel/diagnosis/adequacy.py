@@ -171,21 +171,21 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         problem: The trials. Nothing is doubted without comparable healthy trials, or with a
             self-model that is not calibrated.
     """
-    hardest, healthy = problem.hardest, problem.healthy_trials
+    healthy, expected, reason = problem.healthy_trials, problem.expected, ""
+    is_comparable = problem.calibrate is not None and problem.healthy([INTACT]) is not None
     # In the same movement of a healthy robot, the error of the self-model is on both sides.
     is_told = problem.contrast(accused) >= significance.MIN_Z_ACROSS_TRIALS
-    if problem.calibrate is None or problem.healthy([INTACT]) is None or hardest is None or is_told:
+    if expected is None or not is_comparable or is_told:
         return None
-    worst, reason = float(hardest.mean()), ""
     if known := sufficient_trials(accused, problem):
         intact = problem.table.losses([INTACT], known).mean()
-        if accused and intact <= worst + significance.LOSS_FLOOR:
+        if accused and intact <= problem.hardest + significance.LOSS_FLOOR:
             reason = refit_reason(accused, problem)
         return Doubt(reason, LONGER) if reason else None
     loss = fit.intact_loss if accused else fit.loss
     has_one_gait = _have_one_gait(healthy)
-    ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
-    is_small = loss <= ratio * worst + significance.LOSS_FLOOR
+    beyond, ratio = loss - significance.LOSS_FLOOR, significance.LOSS_RATIO
+    is_small = beyond <= ratio ** (2 if has_one_gait else 1) * expected.mean()
     faster = faster_joints(problem.trials, problem)
     left = share_left(accused, fit, problem)
     if left > MAX_LEFT:
@@ -197,8 +197,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     elif is_small:
         joints = {joint.name for joint in problem.space.anatomy.joints}
         parts = [*fit.joints, *(fault.part for fault in accused.faults if fault.part in joints)]
-        is_real = loss > worst + significance.LOSS_FLOOR
-        if left <= COMPLETE and is_real:
+        if left <= COMPLETE and beyond > expected.mean():
             reason = refit_reason(accused, problem)
         elif any(joint in faster for joint in parts):
             faster = {joint: speeds for joint, speeds in faster.items() if joint in parts}
@@ -318,8 +317,9 @@ def fit_of(best: Hypothesis, problem: Problem) -> Fit:
     """Returns how well the best hypothesis predicts the trials.
 
     Trials with the gait of the healthy ones are compared with all of these. Others are compared
-    with the one that is predicted worst: gaits differ in how hard they are to predict, which the
-    scatter of the pieces of all healthy trials does not contain. Joints are suspected only in the
+    with what is expected of a healthy robot in them (``Problem.expected``): gaits differ in how
+    hard they are to predict, which the scatter of the pieces of all healthy trials does not
+    contain. Joints are suspected only in the
     same gait: another one loads the joints otherwise, and 16 of 24 healthy robots would be
     suspected.
     """
@@ -329,7 +329,7 @@ def fit_of(best: Hypothesis, problem: Problem) -> Fit:
     joints = excesses(INTACT, problem) if is_one_gait and not best else {}
     loss, intact_loss = float(losses.mean()), float(intact.mean())
     healthy_loss = excess = left = None
-    reference = problem.reference if is_one_gait else problem.hardest
+    reference = problem.reference if is_one_gait else problem.expected
     if reference is not None:
         healthy_loss = float(reference.mean())
         excess = significance.excess_over_healthy(losses, reference)
@@ -399,7 +399,8 @@ def share_left(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
     if not accused or fit.healthy_loss is None:
         return 1.0
     loss, intact = problem.losses([accused, INTACT]).mean(axis=1)
-    return significance.share_left(float(loss), float(intact), fit.healthy_loss) or 0.0
+    healthy = min(fit.healthy_loss, problem.hardest)
+    return significance.share_left(float(loss), float(intact), healthy) or 0.0
 
 
 def refit_reason(accused: Hypothesis, problem: Problem) -> str:

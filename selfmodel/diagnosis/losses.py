@@ -28,6 +28,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import sensitivity
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
@@ -98,6 +99,7 @@ class LossTable:
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
         self._prepared: dict[Hashable, PreparedPart] = {}
         self._known: dict[tuple[Hashable, int, Hypothesis], Losses] = {}
+        self._sensitivity: dict[Hashable, float] = {}
 
     def of_robot(self, robot: Robot) -> "LossTable":
         """Returns an empty table of the same comparator, with another self-model."""
@@ -141,6 +143,14 @@ class LossTable:
             # A change near the end of a trial leaves no piece of it.
             total += losses.mean(axis=1) if losses.shape[1] else 0.0
         return total
+
+    def sensitivity(self, trials: Sequence[Trial]) -> float:
+        """Returns how sensitive predictions of trials are to errors of the state, on average."""
+        for trial in trials:
+            if trial.content not in self._sensitivity:
+                robot, threads = self._simulator.robot, self._simulator.threads
+                self._sensitivity[trial.content] = sensitivity(robot, trial, threads)
+        return float(np.mean([self._sensitivity[trial.content] for trial in trials]))
 
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
         """Returns the losses of each hypothesis on all trials, ``(n, pieces)``.

@@ -198,7 +198,8 @@ class Problem:
 
         Encoders that are lost in the trials to explain are left out of the healthy ones.
         """
-        return np.concatenate(self._references) if self._references else None
+        rows = [losses for _, losses in self._references]
+        return np.concatenate(rows) if rows else None
 
     def suffices(self, hypothesis: Hypothesis) -> bool:
         """Returns whether joints stand, and a hypothesis predicts the trials as the healthy ones.
@@ -222,14 +223,30 @@ class Problem:
         return frozenset(parts)
 
     @property
-    def hardest(self) -> FloatArray | None:
-        """The part of ``reference`` of the healthy trial with the largest mean loss."""
-        return max(self._references, key=np.mean, default=None)
+    def hardest(self) -> float:
+        """Largest mean loss of the empty hypothesis on a healthy trial; 0 without any."""
+        return max((float(losses.mean()) for _, losses in self._references), default=0.0)
 
     @cached_property
-    def _references(self) -> list[FloatArray]:
-        rows = [np.asarray(self.table.losses([INTACT], [part])[0]) for part in self._observed]
-        return [row for row in rows if len(row)]  # a part before a change may have no piece
+    def _references(self) -> list[tuple[TrialPart, FloatArray]]:
+        rows = [(part, self.table.losses([INTACT], [part])[0]) for part in self._observed]
+        return [(part, row) for part, row in rows if len(row)]  # before a change may be no piece
+
+    @cached_property
+    def expected(self) -> FloatArray | None:
+        """Losses that are expected of a healthy robot in another gait than the healthy trials'.
+
+        They are those of the healthy trial for which they are largest: its own, times the ratio of
+        the sensitivity of the trials to explain to its own, if that is above 1.
+        """
+        by_trial = []
+        for part, losses in self._references:
+            ratio = 1.0
+            with suppress(InputError):  # without a calibration, a trial may be too short
+                here = self.table.sensitivity([one.rows for one in self.trials])
+                ratio = max(here / self.table.sensitivity([part.rows]), 1.0)
+            by_trial.append(ratio * losses)
+        return max(by_trial, key=np.mean, default=None)
 
     @cached_property
     def has_joints(self) -> bool:
