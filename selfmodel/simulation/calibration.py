@@ -16,7 +16,14 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
-from selfmodel.simulation.fit import NOMINAL, Fit, expected_models, is_determined, nested_fits
+from selfmodel.simulation.fit import (
+    NOMINAL,
+    Fit,
+    expected_models,
+    is_determined,
+    nested_fits,
+    with_finer_step,
+)
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
 from selfmodel.simulation.requests import MAX_CHAIN
@@ -185,17 +192,23 @@ def calibrate(
         raise InputError("expected at least one trial of the healthy robot, got none")
     with threadpool_limits(1, "blas"):  # several round sums differently
         most = expected_models(robot)
-        segments = _segment_errors(
-            robot,
-            list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True)),
-            threads,
-            {} if known is None else known,
-            lambda done: observer(Progress(STAGE, min(done, most), most)),
-        )
+        given = list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True))
+        predictions = {} if known is None else known
+
+        def segments_of(own: Robot) -> SegmentErrors:
+            return _segment_errors(own, given, threads, predictions, on_models)
+
+        def on_models(done: int) -> None:
+            observer(Progress(STAGE, min(done, most), most))
+
+        segments = segments_of(robot)
         before = segments.of([nominal(robot)])[:, 0]
-        prior = model_factors.prior_deviations(robot)
-        first = Fit(NOMINAL, nominal(robot), prior, before, before)
         is_exact = root_mean_square(before) < EXACT_ERROR
+        if not is_exact:
+            segments = with_finer_step(robot, segments_of)
+        own, prior = segments.robot, model_factors.prior_deviations(robot)
+        errors = segments.of([nominal(own)])[:, 0]
+        first = Fit(NOMINAL, nominal(own), prior, errors, errors)
         best = first if is_exact else nested_fits(segments, first)[-1]
         if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
@@ -211,7 +224,7 @@ def calibrate(
         loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, first))
         is_fixed, parameters = robot.has_fixed_base, best.parameters
         return Calibration(
-            robot=robot if best is first else model_factors.with_parameters(robot, parameters),
+            robot=own if best is first else model_factors.with_parameters(own, parameters),
             parameters=parameters,
             deviations=deviations,
             error_before=float(root_mean_square(before)),
@@ -267,7 +280,7 @@ def _segment_errors(
     data = []
     for (trial, hypothesis), length in zip(trials, lengths, strict=True):
         following = share if length > MAX_CHAIN else MAX_FOLLOWING
-        key = (trial.content, following, hypothesis)
+        key = (trial.content, following, hypothesis, robot.model.opt.timestep)
         if key not in known:
             segments = observed_segments(robot, trial, following)
             known[key] = replace(segments, hypothesis=hypothesis)
