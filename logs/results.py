@@ -40,6 +40,7 @@ RESULT, SEARCHES = "result.json", "searches.json"
 Read = TypeVar("Read")
 
 ContactFactor = Annotated[float, Meta(ge=0.01, le=100)]
+PhysicsSteps = Annotated[int, Meta(ge=1, le=8)]
 
 
 class Search(Struct, frozen=True):
@@ -277,6 +278,7 @@ class CalibrationResult(Struct, frozen=True):
     held_out_gain: float
     contact_stiffness: ContactFactor
     contact_damping: ContactFactor
+    finer: PhysicsSteps = 1
     joints: dict[str, Any] | None = None
     suspicion: SuspicionResult | None = None
 

@@ -389,7 +389,9 @@ class DiagnosisFile(Generic[Result]):
             )
         doubt = fit.suspicion
         return Calibration(
-            robot=robot if fit.set == NOMINAL else with_parameters(robot, parameters),
+            robot=robot.finer(parameters.finer)
+            if fit.set == NOMINAL
+            else with_parameters(robot, parameters),
             parameters=parameters,
             deviations=np.array(fit.deviations),
             error_before=fit.error_before,

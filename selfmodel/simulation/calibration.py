@@ -17,12 +17,13 @@ from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
 from selfmodel.simulation.fit import (
+    FINER,
     NOMINAL,
     Fit,
     expected_models,
+    finer_fit,
     is_determined,
     nested_fits,
-    with_finer_step,
 )
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
@@ -96,7 +97,7 @@ class Calibration:
         lines = (
             f"<Calibration of {self.robot.name}: control delay {self.parameters.delay}",
             f"error {self.error_before:.3g} before, {self.error:.3g} after",
-            *(*self.contacts, *factors, *([self.suspicion] if self.suspicion else ())),
+            *(*self.changes, *factors, *([self.suspicion] if self.suspicion else ())),
         )
         return "\n  ".join(map(str, lines)) + ">"
 
@@ -133,12 +134,16 @@ class Calibration:
         return values_by_name(title, label, names, list(factors), ends=ends, reference=1.0)
 
     @property
-    def contacts(self) -> tuple[str, ...]:
-        """A line on the contacts, if the fit changed them."""
-        if not self.parameters.has_other_contacts:
-            return ()
-        stiffness, damping = self.parameters.contact_stiffness, self.parameters.contact_damping
-        return (f"contacts: stiffness x {stiffness:g}, damping x {damping:g}",)
+    def changes(self) -> tuple[str, ...]:
+        """Lines on the physics step and on the contacts, if the fit changed them."""
+        fitted, lines = self.parameters, list[str]()
+        if fitted.finer > 1:
+            step = 1e3 * self.robot.model.opt.timestep
+            lines += [f"physics step: {step:g} ms, {fitted.finer * step:g} ms before"]
+        if fitted.has_other_contacts:
+            stiffness, damping = fitted.contact_stiffness, fitted.contact_damping
+            lines += [f"contacts: stiffness x {stiffness:g}, damping x {damping:g}"]
+        return tuple(lines)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -201,15 +206,17 @@ def calibrate(
         def on_models(done: int) -> None:
             observer(Progress(STAGE, min(done, most), most))
 
-        segments = segments_of(robot)
+        segments, finer = segments_of(robot), 1
         before = segments.of([nominal(robot)])[:, 0]
+        prior = model_factors.prior_deviations(robot)
+        first = Fit(NOMINAL, nominal(robot), prior, before, before)
         is_exact = root_mean_square(before) < EXACT_ERROR
-        if not is_exact:
-            segments = with_finer_step(robot, segments_of)
-        own, prior = segments.robot, model_factors.prior_deviations(robot)
-        errors = segments.of([nominal(own)])[:, 0]
-        first = Fit(NOMINAL, nominal(own), prior, errors, errors)
         best = first if is_exact else nested_fits(segments, first)[-1]
+        # Without contacts, a step hardly matters.
+        if not (is_exact or robot.has_fixed_base):
+            in_finer_steps = segments_of(robot.finer(FINER))
+            if (fit := finer_fit(best, segments, in_finer_steps)) is not None:
+                segments, best, finer = in_finer_steps, fit, FINER
         if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
@@ -222,9 +229,9 @@ def calibrate(
         )
         observer(Progress(STAGE, most, most))
         loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, first))
-        is_fixed, parameters = robot.has_fixed_base, best.parameters
+        is_fixed, parameters = robot.has_fixed_base, replace(best.parameters, finer=finer)
         return Calibration(
-            robot=own if best is first else model_factors.with_parameters(own, parameters),
+            robot=robot if best is first else model_factors.with_parameters(robot, parameters),
             parameters=parameters,
             deviations=deviations,
             error_before=float(root_mean_square(before)),

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -326,16 +326,35 @@ def test_trials_that_are_too_short_for_a_refit_are_not_judged(
     assert "too short" in doubt.reason
 
 
-@pytest.mark.parametrize(("gait", "reference"), [("third", max), ("first", np.mean)])
-def test_another_gait_is_compared_with_the_healthy_trial_that_is_predicted_worst(
-    table: LossTable, real: Robot, healthy: list[Trial], gait: str, reference: Callable
+def test_another_gait_is_compared_with_the_healthy_trial_and_by_how_sensitive_it_is_beside_it(
+    table: LossTable, real: Robot, healthy: list[Trial]
 ):
-    problem = problem_of(table, moved(real, gait), healthy)
+    third = moved(real, "third")
     losses = [table.losses([INTACT], [one]).mean() for one in healthy]
-    fit = fit_of(INTACT, problem)
+    ratios = [table.sensitivity([third]) / table.sensitivity([one]) for one in healthy]
+    fit = fit_of(INTACT, problem_of(table, third, healthy))
 
     assert losses[0] != pytest.approx(losses[1], rel=0.1)
-    assert fit.healthy_loss == pytest.approx(reference(losses))
+    assert max(ratios) > 1
+    expected = max(loss * max(ratio, 1) for loss, ratio in zip(losses, ratios, strict=True))
+    assert fit.healthy_loss == pytest.approx(expected)
+
+
+def test_an_easier_gait_is_expected_to_be_predicted_as_badly_as_the_healthy_trials(
+    table: LossTable, healthy: list[Trial], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(table, "sensitivity", lambda trials: 1.0 + 9.0 * (trials[0] in healthy))
+    problem = problem_of(table, dataclasses.replace(healthy[0], path="easier"), healthy[1:])
+
+    np.testing.assert_array_equal(problem.expected, table.losses([INTACT], healthy[1:])[0])
+
+
+def test_the_known_gait_is_compared_with_all_healthy_trials(
+    table: LossTable, real: Robot, healthy: list[Trial]
+):
+    fit = fit_of(INTACT, problem_of(table, moved(real, "first"), healthy))
+
+    assert fit.healthy_loss == pytest.approx(table.losses([INTACT], healthy).mean())
 
 
 def test_a_healthy_part_without_a_piece_is_no_reference(

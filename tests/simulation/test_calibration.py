@@ -214,12 +214,28 @@ def test_contacts_that_differ_are_found_under_noise():
 
     assert found.parameters.contact_stiffness in {1.0, 2.0, 4.0}
     assert found.parameters.contact_damping in {0.125, 0.25, 0.5}
-    assert found.contacts
-    assert found.contacts[0] in repr(found)
+    assert found.changes
+    assert found.changes[0] in repr(found)
     np.testing.assert_allclose(
         found.robot.model.geom("torso").solref,
         [-5000 * found.parameters.contact_stiffness, -300 * found.parameters.contact_damping],
     )
+
+
+@search
+@pytest.mark.parametrize("parts", [1, 4])
+def test_the_physics_step_is_halved_for_a_robot_that_moves_as_with_a_finer_one(parts: int):
+    physical = with_parameters(QUADRUPED, dataclasses.replace(TRUE, finer=parts))
+    healthy = noisy(QUADRUPED, physical, 1, steps=400)
+    found = calibrate(QUADRUPED, [healthy], threads=2)
+    halved = parts > 1
+
+    assert found.parameters.finer == 1 + halved
+    assert found.robot.model.opt.timestep * found.parameters.finer == QUADRUPED.model.opt.timestep
+    assert found.robot.control_timestep == QUADRUPED.control_timestep
+    assert any("physics step: 2.5 ms, 5 ms before" in line for line in found.changes) == halved
+    rebuilt = with_parameters(QUADRUPED, found.parameters)
+    assert rebuilt.mjcf == found.robot.mjcf
 
 
 @search
@@ -314,7 +330,7 @@ def test_contacts_are_not_fitted_to_the_few_steps_of_a_short_log():
     """Its 40 segments of 10 steps share 60 steps, and seem to agree on other contacts."""
     log = read_log(LOGS_OF_0_1 / "calibrated" / "before.mcap")
 
-    assert calibrate(robot_of(log), [log.trial], threads=1).contacts == ()
+    assert calibrate(robot_of(log), [log.trial], threads=1).changes == ()
 
 
 ARM = """
