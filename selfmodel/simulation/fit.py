@@ -191,7 +191,7 @@ def finer_fit(known: Fit, segments: SegmentErrors, finer: SegmentErrors) -> Fit 
     errors = finer.of([known.parameters])[:, 0]
     losses, lower = segments.losses(known.errors), finer.losses(errors)
     is_gain = lower.mean() <= (1 - MIN_GAIN_OF_FINER) * losses.mean()
-    if not is_gain or not is_better(lower, losses, CONTACTS_MIN_Z):
+    if not is_gain or not is_better(lower, losses, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
         return None
     best = replace(known, errors=errors, held_out=errors)
     for name, basis in bases(finer.robot):
