@@ -7,9 +7,9 @@ trials, the following is asked before a robot is called damaged:
 
 1. **Explanation.** Does the fault explain most of the loss? If not, or if there is no fault that
    does, the gait may be the cause, unless it is no faster than the healthy ones and the loss is too
-   large for the error of a fitted model: more than ``LOSS_RATIO`` times that of the worst healthy
-   trial, or its square if the healthy trials have one gait. A fault that explains such a loss needs
-   no more questions.
+   large for the error of a fitted model: more than ``LOSS_RATIO`` times that which is expected
+   (``Problem.expected``), or its square if the healthy trials have one gait. A fault that explains
+   such a loss needs no more questions.
 2. **Coverage.** Do the healthy trials move the accused joints about as fast, and do they have two
    gaits or more? With one, the error of the self-model in another gait is unknown. Speeds are those
    of the commands: no fault changes them in a gait that is played back. Of a fault that leaves

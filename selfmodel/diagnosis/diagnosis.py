@@ -64,7 +64,8 @@ class Fit:
     Attributes:
         loss: Mean loss of the best hypothesis on a piece of the trials.
         intact_loss: Mean loss of the empty hypothesis on the same pieces.
-        healthy_loss: Mean loss of the empty hypothesis on healthy trials, the reference; None
+        healthy_loss: Mean loss of the empty hypothesis that is expected of the healthy robot, the
+            reference: in another gait than that of the healthy trials, more than on these. None
             without healthy trials.
         excess: Excess of ``loss`` over ``healthy_loss``, standard errors; None without healthy
             trials.

@@ -171,10 +171,10 @@ def fit_sentence(diagnosis: Diagnosis) -> str:
     losses = f"mean loss {_number(fit.loss)}, intact {_number(fit.intact_loss)}"
     if fit.healthy_loss is None or fit.excess is None:
         return f"M{losses[1:]}; no trial of the healthy robot to compare with."
-    limit = f"limit {fit.threshold:g} {SIGMA}, or {LOSS_RATIO:g} times their loss"
+    limit = f"limit {fit.threshold:g} {SIGMA}, or {LOSS_RATIO:g} times that loss"
     return (
-        f"Residual {_excess(fit.excess)} above the healthy trials ({limit}); {losses}, healthy "
-        f"trials {_number(fit.healthy_loss)}."
+        f"Residual {_excess(fit.excess)} above the loss expected of the healthy robot ({limit}); "
+        f"{losses}, expected {_number(fit.healthy_loss)}."
     )
 
 
