@@ -18,12 +18,12 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
 from selfmodel.simulation.fit import (
     FINER,
-    NOMINAL,
     Fit,
     expected_models,
-    finer_fit,
     is_determined,
+    needs_finer_step,
     nested_fits,
+    nominal_fit,
 )
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
@@ -207,16 +207,14 @@ def calibrate(
             observer(Progress(STAGE, min(done, most), most))
 
         segments, finer = segments_of(robot), 1
-        before = segments.of([nominal(robot)])[:, 0]
-        prior = model_factors.prior_deviations(robot)
-        first = Fit(NOMINAL, nominal(robot), prior, before, before)
+        first = start = nominal_fit(segments)
+        before, prior = first.errors, first.deviations
         is_exact = root_mean_square(before) < EXACT_ERROR
-        best = first if is_exact else nested_fits(segments, first)[-1]
-        # Without contacts, a step hardly matters.
         if not (is_exact or robot.has_fixed_base):
             in_finer_steps = segments_of(robot.finer(FINER))
-            if (fit := finer_fit(best, segments, in_finer_steps)) is not None:
-                segments, best, finer = in_finer_steps, fit, FINER
+            if needs_finer_step(segments, in_finer_steps):
+                segments, finer, start = in_finer_steps, FINER, nominal_fit(in_finer_steps)
+        best = first if is_exact else nested_fits(segments, start)[-1]
         if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
