@@ -3,7 +3,7 @@
 See ``fit`` for the sets of parameters, their fit and its test.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -28,6 +28,7 @@ from selfmodel.simulation.fit import (
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
 from selfmodel.simulation.requests import MAX_CHAIN
+from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.segments import (
     MAX_FOLLOWING,
     ObservedSegments,
@@ -198,10 +199,11 @@ def calibrate(
     with threadpool_limits(1, "blas"):  # several round sums differently
         most = expected_models(robot)
         given = list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True))
-        predictions = {} if known is None else known
+        predictions, stats = {} if known is None else known, SimulationStats()
 
         def segments_of(own: Robot) -> SegmentErrors:
-            return _segment_errors(own, given, threads, predictions, on_models)
+            segments = _segment_errors(own, given, threads, predictions)
+            return replace(segments, stats=stats, on_models=on_models)
 
         def on_models(done: int) -> None:
             observer(Progress(STAGE, min(done, most), most))
@@ -277,7 +279,6 @@ def _segment_errors(
     trials: Sequence[tuple[Trial, Hypothesis]],
     threads: int,
     known: Known,
-    on_models: Callable[[int], None] = lambda _: None,
 ) -> SegmentErrors:
     # Long trials share the time that is simulated of one.
     lengths = [float(np.ptp(trial.trajectory.time)) for trial, _ in trials]
@@ -290,7 +291,7 @@ def _segment_errors(
             segments = observed_segments(robot, trial, following)
             known[key] = replace(segments, hypothesis=hypothesis)
         data.append(known[key])
-    return SegmentErrors(robot, data, threads, on_models)
+    return SegmentErrors(robot, data, threads)
 
 
 def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:

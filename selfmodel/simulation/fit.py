@@ -227,7 +227,8 @@ def expected_models(robot: Robot) -> int:
     else:
         method, tried = FLOATING, 0
         count += delays + 2 * (delay_parts(robot).bit_length() - 1)
-        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 9  # and neighbours
+        # Neighbours of the contacts, too, and one with the finer step.
+        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 10
     for _, basis in bases(robot):
         width = len(basis.prior)
         slopes = 2 * width if method.is_central else width
