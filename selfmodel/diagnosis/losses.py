@@ -144,13 +144,15 @@ class LossTable:
             total += losses.mean(axis=1) if losses.shape[1] else 0.0
         return total
 
-    def sensitivity(self, trials: Sequence[Trial]) -> float:
+    def sensitivity(self, parts: Sequence[TrialPart]) -> float:
         """Returns how sensitive predictions of trials are to errors of the state, on average."""
-        for trial in trials:
+        found = []
+        for trial in [part.rows for part in parts]:
             if trial.content not in self._sensitivity:
                 robot, threads = self._simulator.robot, self._simulator.threads
                 self._sensitivity[trial.content] = sensitivity(robot, trial, threads)
-        return float(np.mean([self._sensitivity[trial.content] for trial in trials]))
+            found.append(self._sensitivity[trial.content])
+        return float(np.mean(found))
 
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
         """Returns the losses of each hypothesis on all trials, ``(n, pieces)``.

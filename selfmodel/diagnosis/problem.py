@@ -236,17 +236,22 @@ class Problem:
     def expected(self) -> FloatArray | None:
         """Losses that are expected of a healthy robot in another gait than the healthy trials'.
 
-        They are those of the healthy trial for which they are largest: its own, times the ratio of
-        the sensitivity of the trials to explain to its own, if that is above 1.
+        They are those of the healthy trial for which they are largest: its own, times the relative
+        sensitivity of the trials to explain.
         """
-        by_trial = []
-        for part, losses in self._references:
-            ratio = 1.0
+        rows = [self._relative_sensitivity(part) * losses for part, losses in self._references]
+        return max(rows, key=np.mean, default=None)
+
+    def _relative_sensitivity(self, healthy: TrialPart) -> float:
+        """Returns the sensitivity of the trials to explain over that of a healthy trial.
+
+        It is at least 1, and 1 with a fixed base: no contacts make an error grow.
+        """
+        if self.space.anatomy.floating_base:
             with suppress(InputError):  # without a calibration, a trial may be too short
-                here = self.table.sensitivity([one.rows for one in self.trials])
-                ratio = max(here / self.table.sensitivity([part.rows]), 1.0)
-            by_trial.append(ratio * losses)
-        return max(by_trial, key=np.mean, default=None)
+                here, there = map(self.table.sensitivity, (self.trials, [healthy]))
+                return max(here / there, 1.0)
+        return 1.0
 
     @cached_property
     def has_joints(self) -> bool:

@@ -331,7 +331,10 @@ def test_another_gait_is_compared_with_the_healthy_trial_and_by_how_sensitive_it
 ):
     third = moved(real, "third")
     losses = [table.losses([INTACT], [one]).mean() for one in healthy]
-    ratios = [table.sensitivity([third]) / table.sensitivity([one]) for one in healthy]
+    ratios = [
+        table.sensitivity([TrialPart(third)]) / table.sensitivity([TrialPart(one)])
+        for one in healthy
+    ]
     fit = fit_of(INTACT, problem_of(table, third, healthy))
 
     assert losses[0] != pytest.approx(losses[1], rel=0.1)
@@ -343,7 +346,7 @@ def test_another_gait_is_compared_with_the_healthy_trial_and_by_how_sensitive_it
 def test_an_easier_gait_is_expected_to_be_predicted_as_badly_as_the_healthy_trials(
     table: LossTable, healthy: list[Trial], monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(table, "sensitivity", lambda trials: 1.0 + 9.0 * (trials[0] in healthy))
+    monkeypatch.setattr(table, "sensitivity", lambda parts: 1.0 + 9.0 * (parts[0].trial in healthy))
     problem = problem_of(table, dataclasses.replace(healthy[0], path="easier"), healthy[1:])
 
     np.testing.assert_array_equal(problem.expected, table.losses([INTACT], healthy[1:])[0])
