@@ -319,9 +319,8 @@ def fit_of(best: Hypothesis, problem: Problem) -> Fit:
     Trials with the gait of the healthy ones are compared with all of these. Others are compared
     with what is expected of a healthy robot in them (``Problem.expected``): gaits differ in how
     hard they are to predict, which the scatter of the pieces of all healthy trials does not
-    contain. Joints are suspected only in the
-    same gait: another one loads the joints otherwise, and 16 of 24 healthy robots would be
-    suspected.
+    contain. Joints are suspected only in the same gait: another one loads the joints otherwise, and
+    16 of 24 healthy robots would be suspected.
     """
     losses, intact = problem.losses([best, INTACT])
     rows = ([part.rows for part in each] for each in (problem.trials, problem.healthy_trials))

@@ -4,7 +4,7 @@ The sets grow: none; the control delay; the stiffness and damping of contacts; f
 chosen only if it predicts segments that were left out of its fit significantly better than the set
 chosen before. Delay and contacts are found by exhaustive search; factors by a box-constrained
 nonlinear least squares (``mujoco.minimize``) with a Gaussian prior for those that the trials do not
-determine. At last, a finer physics step is tried (``finer_fit``).
+determine. The physics step is chosen before (``needs_finer_step``).
 
 A robot with a floating base has one set of factors. With a fixed base, which determines neither
 masses nor the friction of the ground, nor has contacts, there are three: gain, damping, dry
@@ -160,13 +160,13 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
 def _before_factors(segments: SegmentErrors, first: Fit) -> tuple[list[Fit], Parameters]:
     """Returns the nominal set, those of delay and contacts that were chosen, and the best values.
 
-    The best delay is the start of the factors though it may not be significant. A fixed base has
-    the first set alone.
+    The best delay is the start of the factors, significant or not. A fixed base has the nominal set
+    alone.
     """
-    chosen = [first]
+    chosen, steps = [first], range(MAX_CONTROL_DELAY + 1)
     if segments.robot.has_fixed_base:
         return chosen, first.parameters
-    delays = [replace(first.parameters, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
+    delays = [replace(first.parameters, delay=delay) for delay in steps]
     whole = _best_candidate(DELAY, segments, delays, first)
     _choose(chosen, segments, whole, MIN_Z)
     part = _part_delay(segments, whole)
@@ -175,9 +175,9 @@ def _before_factors(segments: SegmentErrors, first: Fit) -> tuple[list[Fit], Par
         replace(fit.parameters, contact_stiffness=stiffness, contact_damping=damping)
         for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
     ]
-    best = _best_candidate(CONTACTS, segments, contacts, fit)
-    is_better_by_far = _choose(chosen, segments, best, CONTACTS_MIN_Z * np.sqrt(segments.overlap))
-    return chosen, (best if is_better_by_far else fit).parameters
+    best, min_z = _best_candidate(CONTACTS, segments, contacts, fit), CONTACTS_MIN_Z
+    is_chosen = _choose(chosen, segments, best, min_z * np.sqrt(segments.overlap))
+    return chosen, (best if is_chosen else fit).parameters
 
 
 def _choose(chosen: list[Fit], segments: SegmentErrors, fit: Fit, min_z: float) -> bool:
@@ -209,13 +209,6 @@ def needs_finer_step(segments: SegmentErrors, finer: SegmentErrors) -> bool:
     losses, lower = (own.losses(own.of([known])[:, 0]) for own in (segments, finer))
     is_gain = lower.mean() <= (1 - MIN_GAIN_OF_FINER) * losses.mean()
     return is_gain and is_better(lower, losses, FINER_MIN_Z * np.sqrt(segments.overlap))
-
-
-def _whole_delay(segments: SegmentErrors, known: Fit) -> Fit:
-    """Returns a fit with the best delay of whole control steps."""
-    steps = range(MAX_CONTROL_DELAY + 1)
-    delays = [replace(known.parameters, delay=delay) for delay in steps]
-    return _best_candidate(DELAY, segments, delays, known)
 
 
 def expected_models(robot: Robot) -> int:
