@@ -171,7 +171,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         problem: The trials. Nothing is doubted without comparable healthy trials, or with a
             self-model that is not calibrated.
     """
-    healthy, expected, reason = problem.healthy_trials, problem.expected, ""
+    healthy, expected, reason = problem.healthy_trials, problem.expected(INTACT), ""
     is_comparable = problem.calibrate is not None and problem.healthy([INTACT]) is not None
     # In the same movement of a healthy robot, the error of the self-model is on both sides.
     is_told = problem.contrast(accused) >= significance.MIN_Z_ACROSS_TRIALS
@@ -328,7 +328,7 @@ def fit_of(best: Hypothesis, problem: Problem) -> Fit:
     joints = excesses(INTACT, problem) if is_one_gait and not best else {}
     loss, intact_loss = float(losses.mean()), float(intact.mean())
     healthy_loss = excess = left = None
-    reference = problem.reference if is_one_gait else problem.expected
+    reference = problem.reference if is_one_gait else problem.expected(best)
     if reference is not None:
         healthy_loss = float(reference.mean())
         excess = significance.excess_over_healthy(losses, reference)

@@ -144,14 +144,19 @@ class LossTable:
             total += losses.mean(axis=1) if losses.shape[1] else 0.0
         return total
 
-    def sensitivity(self, parts: Sequence[TrialPart]) -> float:
-        """Returns how sensitive predictions of trials are to errors of the state, on average."""
-        found = []
+    def sensitivity(self, parts: Sequence[TrialPart], hypothesis: Hypothesis = INTACT) -> float:
+        """Returns how sensitive predictions of trials are to errors of the state, on average.
+
+        Of the faults, those that edit the specification are left out.
+        """
+        robot, found = self._simulator.robot, []
+        faults = Hypothesis(tuple(hypothesis.lacking(hypothesis.spec_part)))
         for trial in [part.rows for part in parts]:
-            if trial.content not in self._sensitivity:
-                robot, threads = self._simulator.robot, self._simulator.threads
-                self._sensitivity[trial.content] = sensitivity(robot, trial, threads)
-            found.append(self._sensitivity[trial.content])
+            key = trial.content, faults
+            if key not in self._sensitivity:
+                threads = self._simulator.threads
+                self._sensitivity[key] = sensitivity(robot, trial, faults, threads)
+            found.append(self._sensitivity[key])
         return float(np.mean(found))
 
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:

@@ -232,25 +232,27 @@ class Problem:
         rows = [(part, self.table.losses([INTACT], [part])[0]) for part in self._observed]
         return [(part, row) for part, row in rows if len(row)]  # before a change may be no piece
 
-    @cached_property
-    def expected(self) -> FloatArray | None:
-        """Losses that are expected of a healthy robot in another gait than the healthy trials'.
+    def expected(self, hypothesis: Hypothesis) -> FloatArray | None:
+        """Returns the losses to expect of the right hypothesis in another gait than the healthy.
 
         They are those of the healthy trial for which they are largest: its own, times the relative
-        sensitivity of the trials to explain.
+        sensitivity of the trials to explain. None without healthy trials.
         """
-        rows = [self._relative_sensitivity(part) * losses for part, losses in self._references]
+        rows = [
+            self._relative_sensitivity(hypothesis, part) * losses
+            for part, losses in self._references
+        ]
         return max(rows, key=np.mean, default=None)
 
-    def _relative_sensitivity(self, healthy: TrialPart) -> float:
+    def _relative_sensitivity(self, hypothesis: Hypothesis, healthy: TrialPart) -> float:
         """Returns the sensitivity of the trials to explain over that of a healthy trial.
 
         It is at least 1, and 1 with a fixed base: no contacts make an error grow.
         """
         if self.space.anatomy.floating_base:
             with suppress(InputError):  # without a calibration, a trial may be too short
-                here, there = map(self.table.sensitivity, (self.trials, [healthy]))
-                return max(here / there, 1.0)
+                here = self.table.sensitivity(self.trials, hypothesis)
+                return max(here / self.table.sensitivity([healthy]), 1.0)
         return 1.0
 
     @cached_property

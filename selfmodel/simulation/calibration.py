@@ -262,15 +262,15 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     return float(root_mean_square(errors))
 
 
-def sensitivity(robot: Robot, trial: Trial, threads: int) -> float:
-    """Returns the mean loss of a trial's predictions from states with small errors.
+def sensitivity(robot: Robot, trial: Trial, hypothesis: Hypothesis, threads: int) -> float:
+    """Returns the mean loss of a trial's predictions, with faults, from states with small errors.
 
     See ``SegmentErrors.sensitivity``; the errors are the same in each call.
 
     Raises:
         InputError: Too little of the trial was observed.
     """
-    segments = _segment_errors(robot, [(trial, INTACT)], threads, {})
+    segments = _segment_errors(robot, [(trial, hypothesis)], threads, {})
     return segments.sensitivity(nominal(robot), np.random.default_rng(0))
 
 
