@@ -354,6 +354,17 @@ def test_an_easier_gait_is_expected_to_be_predicted_as_badly_as_the_healthy_tria
     np.testing.assert_array_equal(problem.expected(INTACT), table.losses([INTACT], healthy[1:])[0])
 
 
+def test_a_motion_with_faults_is_expected_to_be_as_sensitive_as_their_predictions(
+    table: LossTable, healthy: list[Trial], weak: Trial, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(table, "sensitivity", lambda _, faults=INTACT: 2.0 + len(faults))
+    problem, losses = problem_of(table, weak, healthy[:1]), table.losses([INTACT], healthy[:1])[0]
+
+    faults = parse(WEAK, problem.space.anatomy)
+    np.testing.assert_allclose(problem.expected(faults), 1.5 * losses)
+    np.testing.assert_allclose(problem.expected(INTACT), losses)
+
+
 def test_the_known_gait_is_compared_with_all_healthy_trials(
     table: LossTable, real: Robot, healthy: list[Trial]
 ):

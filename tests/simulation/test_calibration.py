@@ -19,7 +19,13 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import calibration, fit, segments
-from selfmodel.simulation.calibration import EXACT_ERROR, Calibration, calibrate, prediction_error
+from selfmodel.simulation.calibration import (
+    EXACT_ERROR,
+    Calibration,
+    calibrate,
+    prediction_error,
+    sensitivity,
+)
 from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import (
     FACTORS,
@@ -220,6 +226,23 @@ def test_contacts_that_differ_are_found_under_noise():
         found.robot.model.geom("torso").solref,
         [-5000 * found.parameters.contact_stiffness, -300 * found.parameters.contact_damping],
     )
+
+
+@search
+def test_sensitivity_is_of_errors_of_the_state_and_not_of_the_model(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    (walk,) = trials(real())
+    knee = parse("motor:front_left_knee=0.3", QUADRUPED.anatomy)
+    known = sensitivity(QUADRUPED, walk, INTACT, 1)
+
+    assert known > 0
+    assert sensitivity(QUADRUPED, walk, INTACT, 2) == known
+    assert sensitivity(QUADRUPED, walk, knee, 1) not in {0.0, known}
+    monkeypatch.setattr(segments, "STATE_ERROR", 2 * segments.STATE_ERROR)
+    assert sensitivity(QUADRUPED, walk, INTACT, 1) > 1.5 * known
+    monkeypatch.setattr(segments, "STATE_ERROR", 0.0)
+    assert sensitivity(QUADRUPED, walk, INTACT, 1) == pytest.approx(0.0, abs=1e-9)
 
 
 @search
