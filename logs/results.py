@@ -40,7 +40,7 @@ RESULT, SEARCHES = "result.json", "searches.json"
 Read = TypeVar("Read")
 
 ContactFactor = Annotated[float, Meta(ge=0.01, le=100)]
-PhysicsSteps = Annotated[int, Meta(ge=1, le=8)]
+PhysicsSteps = Annotated[int, Meta(ge=1, le=2)]
 
 
 class Search(Struct, frozen=True):

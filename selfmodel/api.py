@@ -435,8 +435,6 @@ def diagnosis_of_logs(
     fit = fitted(healthy) if calibrate and healthy else None
     if fit is not None:
         on_event(fit)
-        # Refits begin with the physics step that was chosen.
-        fitted = partial(fitted.func, robot.finer(fit.parameters.finer), **fitted.keywords)
     search = DiagnosticSearch(
         Simulator(fit.robot if fit else robot, count),
         chosen.comparator,

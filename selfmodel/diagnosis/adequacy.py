@@ -171,11 +171,11 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         problem: The trials. Nothing is doubted without comparable healthy trials, or with a
             self-model that is not calibrated.
     """
-    healthy, expected, reason = problem.healthy_trials, problem.expected(INTACT), ""
+    healthy, expected, reason = problem.healthy_trials, _expected(accused, fit, problem), ""
     is_comparable = problem.calibrate is not None and problem.healthy([INTACT]) is not None
     # In the same movement of a healthy robot, the error of the self-model is on both sides.
     is_told = problem.contrast(accused) >= significance.MIN_Z_ACROSS_TRIALS
-    if expected is None or not is_comparable or is_told:
+    if not is_comparable or is_told:
         return None
     if known := sufficient_trials(accused, problem):
         intact = problem.table.losses([INTACT], known).mean()
@@ -185,7 +185,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     loss = fit.intact_loss if accused else fit.loss
     has_one_gait = _have_one_gait(healthy)
     beyond, ratio = loss - significance.LOSS_FLOOR, significance.LOSS_RATIO
-    is_small = beyond <= ratio ** (2 if has_one_gait else 1) * expected.mean()
+    is_small = beyond <= ratio ** (2 if has_one_gait else 1) * expected
     faster = faster_joints(problem.trials, problem)
     left = share_left(accused, fit, problem)
     if left > MAX_LEFT:
@@ -197,7 +197,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     elif is_small:
         joints = {joint.name for joint in problem.space.anatomy.joints}
         parts = [*fit.joints, *(fault.part for fault in accused.faults if fault.part in joints)]
-        if left <= COMPLETE and beyond > expected.mean():
+        if left <= COMPLETE and beyond > expected:
             reason = refit_reason(accused, problem)
         elif any(joint in faster for joint in parts):
             faster = {joint: speeds for joint, speeds in faster.items() if joint in parts}
@@ -210,6 +210,14 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         else:
             reason = refit_reason(accused, problem)
     return _doubt(reason, faster, problem) if reason else None
+
+
+def _expected(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
+    """Returns the mean loss to expect: without faults beside an accusation, else of the best."""
+    intact = problem.expected(INTACT)
+    if accused and intact is not None:
+        return float(intact.mean())
+    return max(fit.healthy_loss or 0.0, problem.hardest)
 
 
 def _have_one_gait(trials: Sequence[TrialPart]) -> bool:
@@ -348,17 +356,18 @@ def fit_of(best: Hypothesis, problem: Problem) -> Fit:
 
 
 def is_too_high(fit: Fit) -> bool:
-    """Returns whether the loss is higher than that of healthy trials, significantly and by much."""
+    """Returns whether the loss is higher than expected, significantly and by much."""
     return unlikeness(fit) > 1.0
 
 
 def unlikeness(fit: Fit) -> float:
     """Returns the loss of the best hypothesis over the largest that is expected of the right one.
 
-    From 1 on, the best hypothesis does not explain the trials: its loss is higher than that of
-    healthy trials, significantly and by much, or that of a joint is. Faults make a motion harder to
-    predict: a slipping foot, a body on the ground. So the loss of a hypothesis with faults has to
-    exceed the reference by the factor ``FAULTY_RATIO`` too. 0 without healthy trials.
+    From 1 on, the best hypothesis does not explain the trials: its loss is higher than expected,
+    significantly and by much, or that of a joint is. In the gait of the healthy trials, what is
+    expected does not tell that faults make a motion harder to predict: a slipping foot, a body on
+    the ground. So the loss of a hypothesis with faults has to exceed it by ``FAULTY_RATIO`` too. 0
+    without healthy trials.
     """
     if fit.healthy_loss is None or fit.excess is None:
         return 0.0

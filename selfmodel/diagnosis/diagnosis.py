@@ -64,8 +64,8 @@ class Fit:
     Attributes:
         loss: Mean loss of the best hypothesis on a piece of the trials.
         intact_loss: Mean loss of the empty hypothesis on the same pieces.
-        healthy_loss: Mean loss of the empty hypothesis that is expected of the healthy robot, the
-            reference: in another gait than that of the healthy trials, more than on these. None
+        healthy_loss: Mean loss to expect of the right hypothesis, the reference: that of the empty
+            one on the healthy trials; in another gait more, if that is harder to predict. None
             without healthy trials.
         excess: Excess of ``loss`` over ``healthy_loss``, standard errors; None without healthy
             trials.

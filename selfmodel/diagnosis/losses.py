@@ -147,17 +147,18 @@ class LossTable:
     def sensitivity(self, parts: Sequence[TrialPart], hypothesis: Hypothesis = INTACT) -> float:
         """Returns how sensitive predictions of trials are to errors of the state, on average.
 
-        Of the faults, those that edit the specification are left out.
+        Of the faults, those that edit the specification are left out; so are trials that are too
+        short. 0 if all are. The account does not count these simulations.
         """
-        robot, found = self._simulator.robot, []
+        robot, threads, known = self._simulator.robot, self._simulator.threads, self._sensitivity
         faults = Hypothesis(tuple(hypothesis.lacking(hypothesis.spec_part)))
-        for trial in [part.rows for part in parts]:
-            key = trial.content, faults
-            if key not in self._sensitivity:
-                threads = self._simulator.threads
-                self._sensitivity[key] = sensitivity(robot, trial, faults, threads)
-            found.append(self._sensitivity[key])
-        return float(np.mean(found))
+        for trial in (trials := [part.rows for part in parts if part.rows.trajectory.steps]):
+            if (trial.content, faults) not in known:
+                known[trial.content, faults] = 0.0
+                with suppress(InputError):
+                    known[trial.content, faults] = sensitivity(robot, trial, faults, threads)
+        found = [known[trial.content, faults] for trial in trials]
+        return float(np.mean([one for one in found if one] or 0.0))
 
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
         """Returns the losses of each hypothesis on all trials, ``(n, pieces)``.
@@ -235,6 +236,11 @@ class LossTable:
             if table is not None and table._accepts(trials):  # noqa: SLF001
                 return table, trials
         return self, trials
+
+    @property
+    def physics_step(self) -> float:
+        """Physics step of the self-model, s."""
+        return float(self._simulator.robot.model.opt.timestep)
 
     @cached_property
     def _cheaper(self) -> "LossTable | None":

@@ -24,10 +24,17 @@ from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
 
 class Calibrate(Protocol):
-    """Fits the self-model to trials, given the faults of the robot in each; none by default."""
+    """Fits the self-model to trials, given the faults of the robot in each; none by default.
+
+    Of a self-model that is compared with the fit, the physics step, s, is given too.
+    """
 
     def __call__(
-        self, trials: Sequence[Trial], *, hypotheses: Sequence[Hypothesis] = ()
+        self,
+        trials: Sequence[Trial],
+        *,
+        hypotheses: Sequence[Hypothesis] = (),
+        physics_step: float | None = None,
     ) -> Calibration:
         """Returns the fit."""
 
@@ -146,7 +153,8 @@ class Problem:
             refit = None
             if self.calibrate is not None:
                 with suppress(InputError):
-                    robot = self.calibrate(every, hypotheses=faults).robot
+                    step = self.table.physics_step
+                    robot = self.calibrate(every, hypotheses=faults, physics_step=step).robot
                     refit = replace(self, table=self.table.of_robot(robot))
             self._refits[hypothesis] = refit
         return self._refits[hypothesis]
@@ -250,9 +258,9 @@ class Problem:
         It is at least 1, and 1 with a fixed base: no contacts make an error grow.
         """
         if self.space.anatomy.floating_base:
-            with suppress(InputError):  # without a calibration, a trial may be too short
-                here = self.table.sensitivity(self.trials, hypothesis)
-                return max(here / self.table.sensitivity([healthy]), 1.0)
+            here = self.table.sensitivity(self.trials, hypothesis)
+            there = self.table.sensitivity([healthy])
+            return max(here / there, 1.0) if here and there else 1.0
         return 1.0
 
     @cached_property

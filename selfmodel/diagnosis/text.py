@@ -173,8 +173,8 @@ def fit_sentence(diagnosis: Diagnosis) -> str:
         return f"M{losses[1:]}; no trial of the healthy robot to compare with."
     limit = f"limit {fit.threshold:g} {SIGMA}, or {LOSS_RATIO:g} times that loss"
     return (
-        f"Residual {_excess(fit.excess)} above the loss expected of the healthy robot ({limit}); "
-        f"{losses}, expected {_number(fit.healthy_loss)}."
+        f"Residual {_excess(fit.excess)} above the expected loss ({limit}); {losses}, expected "
+        f"{_number(fit.healthy_loss)}."
     )
 
 

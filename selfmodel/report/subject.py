@@ -389,8 +389,8 @@ class DiagnosisFile(Generic[Result]):
             )
         doubt = fit.suspicion
         return Calibration(
-            robot=robot.finer(parameters.finer)
-            if fit.set == NOMINAL
+            robot=robot
+            if fit.set == NOMINAL and parameters.finer == 1
             else with_parameters(robot, parameters),
             parameters=parameters,
             deviations=np.array(fit.deviations),

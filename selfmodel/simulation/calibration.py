@@ -18,6 +18,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
 from selfmodel.simulation.fit import (
     FINER,
+    NOMINAL,
     Fit,
     expected_models,
     is_determined,
@@ -43,7 +44,7 @@ EXACT_ERROR = 0.01
 exact."""
 
 Known = dict[Hashable, ObservedSegments]
-"""Segments of trials with the errors of their predictions, by the trial, time and faults."""
+"""Segments of trials with the errors of their predictions, by the trial, time, faults and step."""
 
 STAGE = "calibration"
 """Name of the calibration in its progress."""
@@ -70,9 +71,9 @@ class Calibration:
             limit of each motor (factors) and the damping, dry friction and armature of each hinge
             (N m s/rad, N m, kg m^2), the value in the model, the fitted value, the standard
             deviation of its logarithm, and whether the trials determine it. None for other robots.
-        chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
-            ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
-            or ``joints``.
+        chosen: The chosen set of parameters: ``nominal`` (none, but perhaps a physics step),
+            ``delay``, ``contacts`` or ``factors``; of a robot with a fixed base, ``nominal``,
+            ``delay``, ``shared``, ``kinds`` or ``joints``.
         determined: Whether the trials determine each factor; empty if none was fitted.
         held_out_gain: Relative reduction of the loss in segments that were left out of the fit.
         suspicion: Probable error in the recording of the trials; None without one.
@@ -171,6 +172,7 @@ def calibrate(
     known: Known | None = None,
     *,
     hypotheses: Sequence[Hypothesis] = (),
+    physics_step: float | None = None,
 ) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
@@ -188,7 +190,9 @@ def calibrate(
 
     The ``observer`` is called with the progress of the fit. ``known`` are predictions of trials in
     earlier calibrations of the same robot, to which those of this one are added. ``hypotheses`` are
-    the faults of the robot in each trial; in all it was healthy by default.
+    the faults of the robot in each trial; in all it was healthy by default. ``physics_step``, s, is
+    that of the self-model, a part of the robot's; without one, the trials choose between the
+    robot's own and half of it.
 
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
@@ -208,15 +212,17 @@ def calibrate(
         def on_models(done: int) -> None:
             observer(Progress(STAGE, min(done, most), most))
 
-        segments, finer = segments_of(robot), 1
-        first = start = nominal_fit(segments)
+        own_step = float(robot.model.opt.timestep)
+        segments, finer = segments_of(robot), round(own_step / (physics_step or own_step))
+        first = nominal_fit(segments)
         before, prior = first.errors, first.deviations
-        is_exact = root_mean_square(before) < EXACT_ERROR
-        if not (is_exact or robot.has_fixed_base):
-            in_finer_steps = segments_of(robot.finer(FINER))
-            if needs_finer_step(segments, in_finer_steps):
-                segments, finer, start = in_finer_steps, FINER, nominal_fit(in_finer_steps)
-        best = first if is_exact else nested_fits(segments, start)[-1]
+        is_exact = root_mean_square(before) < EXACT_ERROR and finer == 1
+        is_free = physics_step is None and not (is_exact or robot.has_fixed_base)
+        if is_free and needs_finer_step(segments, segments_of(robot.finer(FINER))):
+            finer = FINER
+        if finer > 1:
+            segments = segments_of(robot.finer(finer))
+        best = first if is_exact else nested_fits(segments, nominal_fit(segments))[-1]
         if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
@@ -230,8 +236,9 @@ def calibrate(
         observer(Progress(STAGE, most, most))
         loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, first))
         is_fixed, parameters = robot.has_fixed_base, replace(best.parameters, finer=finer)
+        is_nominal = best.name == NOMINAL and finer == 1
         return Calibration(
-            robot=robot if best is first else model_factors.with_parameters(robot, parameters),
+            robot=robot if is_nominal else model_factors.with_parameters(robot, parameters),
             parameters=parameters,
             deviations=deviations,
             error_before=float(root_mean_square(before)),

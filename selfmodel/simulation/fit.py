@@ -199,14 +199,17 @@ def needs_finer_step(segments: SegmentErrors, finer: SegmentErrors) -> bool:
     """Returns whether a finer physics step predicts trials better than the robot's own does.
 
     Within a step, a model keeps the forces of contacts and servos as they are; a robot does not.
-    The finer one has to be better with the delay and the contacts that fit the robot's own.
+    The finer one has to be better with the delay that fits the robot's own, and the better of the
+    contacts that do and of the nominal ones: fitted contacts may make up for a coarse step.
 
     Args:
         segments: The trials by the robot with its own step; its base floats.
         finer: The trials by the robot with the finer step.
     """
     _, known = _before_factors(segments, nominal_fit(segments))
-    losses, lower = (own.losses(own.of([known])[:, 0]) for own in (segments, finer))
+    tried = [known, replace(nominal(segments.robot), delay=known.delay)]
+    losses = segments.losses(segments.of([known])[:, 0])
+    lower = min(map(finer.losses, finer.of(tried).T), key=np.mean)
     is_gain = lower.mean() <= (1 - MIN_GAIN_OF_FINER) * losses.mean()
     return is_gain and is_better(lower, losses, FINER_MIN_Z * np.sqrt(segments.overlap))
 
@@ -220,8 +223,8 @@ def expected_models(robot: Robot) -> int:
     else:
         method, tried = FLOATING, 0
         count += delays + 2 * (delay_parts(robot).bit_length() - 1)
-        # Neighbours of the contacts, too, and one with the finer step.
-        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 10
+        # Neighbours of the contacts, too, and two with the finer step.
+        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 11
     for _, basis in bases(robot):
         width = len(basis.prior)
         slopes = 2 * width if method.is_central else width

@@ -390,7 +390,10 @@ class SegmentErrors:
         for own in self.data:
             variants = self._variants([parameters], own.hypothesis)
             exact = self._predicted(variants, own.segments, parameters.delay)
-            observed = {signal: exact[signal][0, :, 1:] for signal in own.observed}
+            observed = {
+                signal: np.where(np.isnan(values), np.nan, exact[signal][0, :, 1:])
+                for signal, values in own.observed.items()
+            }
             for _ in range(PERTURBATIONS):
                 states = {
                     signal: _with_errors(signal, values, rng)
@@ -399,7 +402,8 @@ class SegmentErrors:
                 segments = replace(own.segments, states=states)
                 data.append(replace(own, segments=segments, observed=observed))
         perturbed = replace(self, data=data)
-        return float(perturbed.losses(perturbed.of([parameters])[:, 0]).mean())
+        losses = perturbed.losses(perturbed.of([parameters])[:, 0])
+        return float(losses[np.unique(perturbed.segment_of_error)].mean())
 
     def _of_batch(self, models: Sequence[Parameters]) -> FloatArray:
         variants: dict[tuple[Parameters, Hypothesis], ModelVariant] = {}

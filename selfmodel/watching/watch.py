@@ -104,10 +104,15 @@ class Watch:
         self._horizon = max(COMPARISONS, round(SEGMENT / self._step))
         self._comparator = dataclasses.replace(chosen, horizon=self._horizon, only_last=True)
 
-        def fitted(parts: Sequence[Trial]) -> Robot:
-            return arguments.fitted(robot, parts, count).robot if calibrate else robot
+        whole = arguments.fitted(robot, trials, count).robot if calibrate else robot
 
-        self._reference = reference_of(robot, trials, self._comparator, fitted)
+        def fitted(parts: Sequence[Trial]) -> Robot:
+            if not calibrate:
+                return robot
+            step = float(whole.model.opt.timestep)
+            return arguments.fitted(robot, parts, count, physics_step=step).robot
+
+        self._reference = reference_of(whole, trials, self._comparator, fitted)
         self._space = HypothesisSpace.of(arguments.kinds_of(kinds), robot.anatomy)
         self._simulator = Simulator(self._reference.robot, count)
         self._run_length = every / (self._step * self._horizon)

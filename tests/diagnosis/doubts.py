@@ -69,7 +69,10 @@ def problem_of(
     robot = load_robot("quadruped")
     trials = trial if isinstance(trial, list) else [trial]
 
-    def calibrated(_: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> SimpleNamespace:
+    def calibrated(
+        _: Sequence[Trial], hypotheses: Sequence[Hypothesis], physics_step: float
+    ) -> SimpleNamespace:
+        assert physics_step == table.physics_step
         assert [*hypotheses[: len(healthy)]] == [INTACT] * len(healthy)
         return SimpleNamespace(robot=refit or robot)
 

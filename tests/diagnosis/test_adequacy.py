@@ -12,9 +12,11 @@ from selfmodel import load_policy
 from selfmodel.diagnosis.adequacy import (
     fit_of,
     refit_reason,
+    share_left,
     sufficient_trials,
     supported,
 )
+from selfmodel.diagnosis.diagnosis import Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.significance import LOSS_RATIO, is_better
 from selfmodel.errors import InputError
@@ -137,7 +139,7 @@ def test_a_fault_is_left_out_by_what_the_refits_predict_with_it_and_without(
     for beside_both in (weaker, quadruped):
         problem = problem_of(table, trials, before)
         robots = {JAM: weaker, both: beside_both}
-        problem.calibrate = lambda _, hypotheses, known=robots: SimpleNamespace(
+        problem.calibrate = lambda _, hypotheses, known=robots, **__: SimpleNamespace(
             robot=known[str(hypotheses[-1])]
         )
         found.append(str(supported(parse(both, quadruped.anatomy), problem)[0]))
@@ -363,6 +365,25 @@ def test_a_motion_with_faults_is_expected_to_be_as_sensitive_as_their_prediction
     faults = parse(WEAK, problem.space.anatomy)
     np.testing.assert_allclose(problem.expected(faults), 1.5 * losses)
     np.testing.assert_allclose(problem.expected(INTACT), losses)
+
+
+def test_a_loss_that_is_expected_of_so_sensitive_a_gait_has_to_beat_a_refit(
+    table: LossTable,
+    healthy: list[Trial],
+    weak: Trial,
+    weaker: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+):
+    problem = problem_of(table, weak, healthy, weaker)
+    accused = parse(WEAK, problem.space.anatomy)
+    scaled = Fit(0.5, 1.0, 10 * problem.hardest, None, 6.0, has_faults=True)
+    left = share_left(accused, dataclasses.replace(scaled, healthy_loss=problem.hardest), problem)
+
+    assert doubted(problem, WEAK, ratio=4.0) is None
+    monkeypatch.setattr(table, "sensitivity", lambda parts, *_: 1.0 + 4 * (parts[0].trial == weak))
+    assert doubted(problem, WEAK, ratio=4.0) is not None
+    # What a fault leaves is beyond the healthy trials themselves.
+    assert 0 < left == share_left(accused, scaled, problem)
 
 
 def test_the_known_gait_is_compared_with_all_healthy_trials(

@@ -40,6 +40,17 @@ def servo() -> Robot:
     return robot_of(SERVO.format(friction=0.02, gain=3.0), control_timestep=0.01)
 
 
+def test_an_error_of_the_state_does_not_grow_on_a_bench(
+    servo: Robot, monkeypatch: pytest.MonkeyPatch
+):
+    healthy, other = moved(servo, 3.0), moved(servo, 3.0, pace=2)
+    table = LossTable(Simulator(servo, 1), SEGMENT_PREDICTION)
+    problem = problem_of(table, servo, [other], [healthy], (WEAK_MOTOR,))
+    monkeypatch.setattr(table, "sensitivity", lambda *_: pytest.fail("asked"))
+
+    np.testing.assert_array_equal(problem.expected(INTACT), table.losses([INTACT], [healthy])[0])
+
+
 def moved(
     servo: Robot, gain: float, *, amplitude: float = 1.0, pace: int = 1, seed: int = 0
 ) -> Trial:

@@ -96,15 +96,15 @@ def test_the_change_and_the_undetectable_faults_follow_the_verdict():
         (
             Fit(2e-30, float("inf"), 0.1, 0.0, 6.0, has_faults=False),
             (
-                "Residual 0.0 \u03c3 above the loss expected of the healthy robot (limit 6 "
-                "\u03c3, or 3 times that loss); mean loss 0, intact infinite, expected 0.1."
+                "Residual 0.0 \u03c3 above the expected loss (limit 6 \u03c3, or 3 times that "
+                "loss); mean loss 0, intact infinite, expected 0.1."
             ),
         ),
         (
             Fit(0.1234, 0.5, 0.0, float("inf"), 3.5, has_faults=True),
             (
-                "Residual infinitely many \u03c3 above the loss expected of the healthy robot "
-                "(limit 3.5 \u03c3, or 3 times that loss); mean loss 0.123, intact 0.5, expected 0."
+                "Residual infinitely many \u03c3 above the expected loss (limit 3.5 \u03c3, or 3 "
+                "times that loss); mean loss 0.123, intact 0.5, expected 0."
             ),
         ),
     ],

@@ -262,6 +262,44 @@ def test_the_physics_step_is_halved_for_a_robot_that_moves_as_with_a_finer_one(p
 
 
 @search
+def test_contacts_that_make_up_for_a_coarse_step_do_not_hide_it():
+    (exact,) = trials(QUADRUPED.finer(2), steps=400)
+    found = calibrate(QUADRUPED, [exact], threads=2)
+
+    assert found.parameters.finer == 2
+    assert not found.parameters.has_other_contacts
+    assert found.error < EXACT_ERROR
+
+
+@search
+def test_a_refit_has_the_physics_step_that_is_asked_for():
+    (walk,) = trials(QUADRUPED.finer(2), steps=100)
+    step = QUADRUPED.model.opt.timestep
+    of_steps = [calibrate(QUADRUPED, [walk], 1, physics_step=one) for one in (step, step / 2)]
+
+    assert [one.robot.model.opt.timestep for one in of_steps] == [step, step / 2]
+    assert of_steps[1].error < EXACT_ERROR < of_steps[0].error
+
+
+@search
+def test_sensitivity_is_of_the_steps_that_count():
+    (walk,) = trials(real(), steps=400)
+    given = lacking(walk, BASE)
+    now = given.trajectory
+    is_late = np.arange(now.steps) % 20 == 7
+    delayed = dataclasses.replace(given, trajectory=dataclasses.replace(now, late=is_late))
+    blind = np.where(np.arange(len(now.names.hinges)) < 3, np.nan, now["joint_positions"])
+    signals = {**now.signals, "joint_positions": blind}
+    lost = dataclasses.replace(given, trajectory=dataclasses.replace(now, signals=signals))
+    known, by_late, by_lost = (
+        sensitivity(QUADRUPED, one, INTACT, 1) for one in (given, delayed, lost)
+    )
+
+    assert by_late == pytest.approx(known, rel=0.3)
+    assert 0.3 * known < by_lost < 1.5 * known
+
+
+@search
 def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many_they_are():
     """A robot that floats shows nothing of the ground's friction."""
     mjcf = QUADRUPED.mjcf.replace("<option ", '<option gravity="0 0 0" ', 1)
