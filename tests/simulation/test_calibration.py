@@ -24,7 +24,6 @@ from selfmodel.simulation.calibration import (
     Calibration,
     calibrate,
     prediction_error,
-    sensitivity,
 )
 from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import (
@@ -226,77 +225,6 @@ def test_contacts_that_differ_are_found_under_noise():
         found.robot.model.geom("torso").solref,
         [-5000 * found.parameters.contact_stiffness, -300 * found.parameters.contact_damping],
     )
-
-
-@search
-def test_sensitivity_is_of_errors_of_the_state_and_not_of_the_model(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    (walk,) = trials(real())
-    knee = parse("motor:front_left_knee=0.3", QUADRUPED.anatomy)
-    known = sensitivity(QUADRUPED, walk, INTACT, 1)
-
-    assert known > 0
-    assert sensitivity(QUADRUPED, walk, INTACT, 2) == known
-    assert sensitivity(QUADRUPED, walk, knee, 1) not in {0.0, known}
-    monkeypatch.setattr(segments, "STATE_ERROR", 2 * segments.STATE_ERROR)
-    assert sensitivity(QUADRUPED, walk, INTACT, 1) > 1.5 * known
-    monkeypatch.setattr(segments, "STATE_ERROR", 0.0)
-    assert sensitivity(QUADRUPED, walk, INTACT, 1) == pytest.approx(0.0, abs=1e-9)
-
-
-@search
-@pytest.mark.parametrize("parts", [1, 4])
-def test_the_physics_step_is_halved_for_a_robot_that_moves_as_with_a_finer_one(parts: int):
-    physical = with_parameters(QUADRUPED, dataclasses.replace(nominal(QUADRUPED), finer=parts))
-    healthy = noisy(QUADRUPED, physical, 1, steps=400)
-    found = calibrate(QUADRUPED, [healthy], threads=2)
-    halved = parts > 1
-
-    assert found.parameters.finer == 1 + halved
-    assert found.robot.model.opt.timestep * found.parameters.finer == QUADRUPED.model.opt.timestep
-    assert found.robot.control_timestep == QUADRUPED.control_timestep
-    assert any("physics step: 2.5 ms, 5 ms before" in line for line in found.changes) == halved
-    rebuilt = with_parameters(QUADRUPED, found.parameters)
-    assert rebuilt.mjcf == found.robot.mjcf
-
-
-@search
-def test_contacts_that_make_up_for_a_coarse_step_do_not_hide_it():
-    (exact,) = trials(QUADRUPED.finer(2), steps=400)
-    found = calibrate(QUADRUPED, [exact], threads=2)
-
-    assert found.parameters.finer == 2
-    assert not found.parameters.has_other_contacts
-    assert found.error < EXACT_ERROR
-
-
-@search
-def test_a_refit_has_the_physics_step_that_is_asked_for():
-    (walk,) = trials(QUADRUPED.finer(2), steps=100)
-    step = QUADRUPED.model.opt.timestep
-    of_steps = [calibrate(QUADRUPED, [walk], 1, physics_step=one) for one in (step, step / 2)]
-
-    assert [one.robot.model.opt.timestep for one in of_steps] == [step, step / 2]
-    assert of_steps[1].error < EXACT_ERROR < of_steps[0].error
-
-
-@search
-def test_sensitivity_is_of_the_steps_that_count():
-    (walk,) = trials(real(), steps=400)
-    given = lacking(walk, BASE)
-    now = given.trajectory
-    is_late = np.arange(now.steps) % 20 == 7
-    delayed = dataclasses.replace(given, trajectory=dataclasses.replace(now, late=is_late))
-    blind = np.where(np.arange(len(now.names.hinges)) < 3, np.nan, now["joint_positions"])
-    signals = {**now.signals, "joint_positions": blind}
-    lost = dataclasses.replace(given, trajectory=dataclasses.replace(now, signals=signals))
-    known, by_late, by_lost = (
-        sensitivity(QUADRUPED, one, INTACT, 1) for one in (given, delayed, lost)
-    )
-
-    assert by_late == pytest.approx(known, rel=0.3)
-    assert 0.3 * known < by_lost < 1.5 * known
 
 
 @search
