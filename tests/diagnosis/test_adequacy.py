@@ -419,12 +419,16 @@ def test_each_fault_is_required_in_the_gait_of_a_healthy_trial(
 
 
 def test_a_fault_that_explains_the_whole_loss_has_to_beat_a_refit_in_faster_motions_too(
-    table: LossTable, real: Robot, healthy: list[Trial]
+    table: LossTable, real: Robot, healthy: list[Trial], monkeypatch: pytest.MonkeyPatch
 ):
-    problem = problem_of(table, moved(real, "first", pace=2, truth=BROKEN), healthy)
+    fast = moved(real, "first", pace=2, truth=BROKEN)
+    problem = problem_of(table, fast, healthy)
 
     assert doubted(problem, BROKEN) is None
     assert doubted(problem, BROKEN, 1.0) is not None  # no loss that a fault could explain
+    with monkeypatch.context() as patch:
+        patch.setattr(table, "sensitivity", lambda parts, *_: 1.0 + 4 * (parts[0].trial == fast))
+        assert doubted(problem, BROKEN) is not None  # nor one beyond what is expected
     problem = dataclasses.replace(problem, calibrate=refused)
     doubt = doubted(problem, BROKEN)
     assert doubt is not None
