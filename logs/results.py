@@ -40,7 +40,6 @@ RESULT, SEARCHES = "result.json", "searches.json"
 Read = TypeVar("Read")
 
 ContactFactor = Annotated[float, Meta(ge=0.01, le=100)]
-PhysicsSteps = Annotated[int, Meta(ge=1, le=2)]
 
 
 class Search(Struct, frozen=True):
@@ -278,7 +277,6 @@ class CalibrationResult(Struct, frozen=True):
     held_out_gain: float
     contact_stiffness: ContactFactor
     contact_damping: ContactFactor
-    finer: PhysicsSteps = 1
     joints: dict[str, Any] | None = None
     suspicion: SuspicionResult | None = None
 

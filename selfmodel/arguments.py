@@ -271,7 +271,6 @@ def fitted(
     known: Known | None = None,
     *,
     hypotheses: Sequence[Hypothesis] = (),
-    physics_step: float | None = None,
 ) -> Calibration:
     """Returns a self-model fitted to healthy trials, for callers that calibrate by default.
 
@@ -279,8 +278,7 @@ def fitted(
         InputError: The fit failed; the message names the option that omits calibration.
     """
     try:
-        given = robot, trials, threads, observer, known
-        return calibrate(*given, hypotheses=hypotheses, physics_step=physics_step)
+        return calibrate(robot, trials, threads, observer, known, hypotheses=hypotheses)
     except InputError as error:
         raise InputError(
             f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"

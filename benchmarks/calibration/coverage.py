@@ -110,8 +110,7 @@ def measured(
     start = process_time()
     found = calibrate(robot, [trial], threads=1)
     seconds = process_time() - start
-    delay, finer = found.parameters.delay, found.parameters.finer
-    delayed = with_parameters(robot, replace(nominal(robot), delay=delay, finer=finer))
+    delayed = with_parameters(robot, replace(nominal(robot), delay=found.parameters.delay))
     off = np.log(found.parameters.factors) - np.log(truth.factors(robot.model, robot.root))
     return {
         "robot": robot.name,

@@ -43,8 +43,6 @@ def calibrate(options: Calibrate) -> None:
         "parameters": fit.rows(),
         "delay": fit.parameters.delay,
         "delay_before": before.control_delay,
-        "physics_step": float(fit.robot.model.opt.timestep),
-        "physics_step_before": float(before.model.opt.timestep),
         "contact_stiffness": fit.parameters.contact_stiffness,
         "contact_damping": fit.parameters.contact_damping,
         "error_before": fit.error_before,
@@ -62,7 +60,7 @@ def calibrate(options: Calibrate) -> None:
         print_json(result)
         return
     if fit.joints is None:
-        _print_factors(result, fit.changes)
+        _print_factors(result, fit.contacts)
     else:
         _print_joints(result["joints"])
     print_lines(
@@ -98,7 +96,7 @@ def _print_joints(fit: dict[str, Any]) -> None:
         )
 
 
-def _print_factors(fit: dict[str, Any], changes: Sequence[str]) -> None:
+def _print_factors(fit: dict[str, Any], contacts: Sequence[str]) -> None:
     rows = [
         (
             one["name"],
@@ -122,7 +120,7 @@ def _print_factors(fit: dict[str, Any], changes: Sequence[str]) -> None:
     show(("factor of", "before", "fitted", "uncertainty"), rows)
     print_lines(
         f"delay, control steps: {fit['delay']} ({fit['delay_before']} before)",
-        *changes,
+        *contacts,
         f"error of predicted motion: {fit['error']:.3f} ({fit['error_before']:.3f} before), "
         f"the root mean square over predictions of 10 steps, each signal in its own scale",
         end,

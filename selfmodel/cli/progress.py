@@ -134,7 +134,7 @@ def _fit_lines(fit: Calibration) -> list[str]:
     error = f"calibration: error {fit.error_before:.3f} before, {fit.error:.3f} after; "
     return [
         error + f"delay {counted(fit.parameters.delay, 'step')}{unknown}",
-        *(f"calibration: {line}" for line in fit.changes),
+        *(f"calibration: {line}" for line in fit.contacts),
         *([] if fit.suspicion is None else [f"warning: {fit.suspicion}"]),
     ]
 

@@ -7,9 +7,9 @@ trials, the following is asked before a robot is called damaged:
 
 1. **Explanation.** Does the fault explain most of the loss? If not, or if there is no fault that
    does, the gait may be the cause, unless it is no faster than the healthy ones and the loss is too
-   large for the error of a fitted model: more than ``LOSS_RATIO`` times that which is expected
-   (``Problem.expected``), or its square if the healthy trials have one gait. A fault that explains
-   such a loss needs no more questions.
+   large for the error of a fitted model: more than ``LOSS_RATIO`` times that of the worst healthy
+   trial, or its square if the healthy trials have one gait; without a fault, that which is expected
+   in this gait, if it is larger. A fault that explains such a loss needs no more questions.
 2. **Coverage.** Do the healthy trials move the accused joints about as fast, and do they have two
    gaits or more? With one, the error of the self-model in another gait is unknown. Speeds are those
    of the commands: no fault changes them in a gait that is played back. Of a fault that leaves
@@ -171,7 +171,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         problem: The trials. Nothing is doubted without comparable healthy trials, or with a
             self-model that is not calibrated.
     """
-    healthy, expected, reason = problem.healthy_trials, _expected(accused, fit, problem), ""
+    healthy, reference, reason = problem.healthy_trials, _reference(accused, fit, problem), ""
     is_comparable = problem.calibrate is not None and problem.healthy([INTACT]) is not None
     # In the same movement of a healthy robot, the error of the self-model is on both sides.
     is_told = problem.contrast(accused) >= significance.MIN_Z_ACROSS_TRIALS
@@ -185,7 +185,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     loss = fit.intact_loss if accused else fit.loss
     has_one_gait = _have_one_gait(healthy)
     beyond, ratio = loss - significance.LOSS_FLOOR, significance.LOSS_RATIO
-    is_small = beyond <= ratio ** (2 if has_one_gait else 1) * expected
+    is_small = beyond <= ratio ** (2 if has_one_gait else 1) * reference
     faster = faster_joints(problem.trials, problem)
     left = share_left(accused, fit, problem)
     if left > MAX_LEFT:
@@ -197,7 +197,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     elif is_small:
         joints = {joint.name for joint in problem.space.anatomy.joints}
         parts = [*fit.joints, *(fault.part for fault in accused.faults if fault.part in joints)]
-        if left <= COMPLETE and beyond > expected:
+        if left <= COMPLETE and beyond > reference:
             reason = refit_reason(accused, problem)
         elif any(joint in faster for joint in parts):
             faster = {joint: speeds for joint, speeds in faster.items() if joint in parts}
@@ -212,12 +212,13 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     return _doubt(reason, faster, problem) if reason else None
 
 
-def _expected(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
-    """Returns the mean loss to expect: without faults beside an accusation, else of the best."""
-    intact = problem.expected(INTACT)
-    if accused and intact is not None:
-        return float(intact.mean())
-    return max(fit.healthy_loss or 0.0, problem.hardest)
+def _reference(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
+    """Returns the mean loss beside which a loss is small.
+
+    Beside an accusation it is that of the healthy trials: a fault may make a motion as sensitive as
+    the self-model without it says. Without one, it is what is expected of the best hypothesis.
+    """
+    return problem.hardest if accused else max(fit.healthy_loss or 0.0, problem.hardest)
 
 
 def _have_one_gait(trials: Sequence[TrialPart]) -> bool:

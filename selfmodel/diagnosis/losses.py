@@ -237,11 +237,6 @@ class LossTable:
                 return table, trials
         return self, trials
 
-    @property
-    def physics_step(self) -> float:
-        """Physics step of the self-model, s."""
-        return float(self._simulator.robot.model.opt.timestep)
-
     @cached_property
     def _cheaper(self) -> "LossTable | None":
         surrogate = getattr(self._comparator, "surrogate", None)

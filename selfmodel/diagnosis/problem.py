@@ -24,17 +24,10 @@ from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
 
 class Calibrate(Protocol):
-    """Fits the self-model to trials, given the faults of the robot in each; none by default.
-
-    Of a self-model that is compared with the fit, the physics step, s, is given too.
-    """
+    """Fits the self-model to trials, given the faults of the robot in each; none by default."""
 
     def __call__(
-        self,
-        trials: Sequence[Trial],
-        *,
-        hypotheses: Sequence[Hypothesis] = (),
-        physics_step: float | None = None,
+        self, trials: Sequence[Trial], *, hypotheses: Sequence[Hypothesis] = ()
     ) -> Calibration:
         """Returns the fit."""
 
@@ -153,8 +146,7 @@ class Problem:
             refit = None
             if self.calibrate is not None:
                 with suppress(InputError):
-                    step = self.table.physics_step
-                    robot = self.calibrate(every, hypotheses=faults, physics_step=step).robot
+                    robot = self.calibrate(every, hypotheses=faults).robot
                     refit = replace(self, table=self.table.of_robot(robot))
             self._refits[hypothesis] = refit
         return self._refits[hypothesis]

@@ -321,7 +321,7 @@ def calibration_section(fit: Calibration | None) -> Section | None:
         f"is {fit.chosen}, with a control delay of {steps}. The prior of each factor is 1 with a "
         f"wide interval: a factor whose interval is as wide is {UNDETERMINED}."
     )
-    text = [explained, *fit.changes]
+    text = [explained, *fit.contacts]
     text += [str(fit.suspicion)] if fit.suspicion is not None else []
     return Section("calibration", "Calibration", tuple(text), (error, factors))
 

@@ -389,9 +389,7 @@ class DiagnosisFile(Generic[Result]):
             )
         doubt = fit.suspicion
         return Calibration(
-            robot=robot
-            if fit.set == NOMINAL and parameters.finer == 1
-            else with_parameters(robot, parameters),
+            robot=robot if fit.set == NOMINAL else with_parameters(robot, parameters),
             parameters=parameters,
             deviations=np.array(fit.deviations),
             error_before=fit.error_before,

@@ -123,10 +123,8 @@ class Robot:
         """Returns the robot with that many physics steps in place of each, and all else the same.
 
         Contacts whose time constant is below two physics steps, which MuJoCo lengthens to them, are
-        nearer to what the MJCF says. One part is the robot itself.
+        nearer to what the MJCF says.
         """
-        if parts == 1:
-            return self
         root = parse_xml(self.mjcf)
         # MuJoCo merges repeated sections, and the last value counts.
         ET.SubElement(root, "option", timestep=repr(float(self.model.opt.timestep) / parts))

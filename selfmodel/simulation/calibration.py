@@ -3,7 +3,7 @@
 See ``fit`` for the sets of parameters, their fit and its test.
 """
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -16,20 +16,10 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
-from selfmodel.simulation.fit import (
-    FINER,
-    NOMINAL,
-    Fit,
-    expected_models,
-    is_determined,
-    needs_finer_step,
-    nested_fits,
-    nominal_fit,
-)
+from selfmodel.simulation.fit import NOMINAL, Fit, expected_models, is_determined, nested_fits
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
 from selfmodel.simulation.requests import MAX_CHAIN
-from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.segments import (
     MAX_FOLLOWING,
     ObservedSegments,
@@ -44,7 +34,7 @@ EXACT_ERROR = 0.01
 exact."""
 
 Known = dict[Hashable, ObservedSegments]
-"""Segments of trials with the errors of their predictions, by the trial, time, faults and step."""
+"""Segments of trials with the errors of their predictions, by the trial, time and faults."""
 
 STAGE = "calibration"
 """Name of the calibration in its progress."""
@@ -71,9 +61,9 @@ class Calibration:
             limit of each motor (factors) and the damping, dry friction and armature of each hinge
             (N m s/rad, N m, kg m^2), the value in the model, the fitted value, the standard
             deviation of its logarithm, and whether the trials determine it. None for other robots.
-        chosen: The chosen set of parameters: ``nominal`` (none, but perhaps a physics step),
-            ``delay``, ``contacts`` or ``factors``; of a robot with a fixed base, ``nominal``,
-            ``delay``, ``shared``, ``kinds`` or ``joints``.
+        chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
+            ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
+            or ``joints``.
         determined: Whether the trials determine each factor; empty if none was fitted.
         held_out_gain: Relative reduction of the loss in segments that were left out of the fit.
         suspicion: Probable error in the recording of the trials; None without one.
@@ -99,7 +89,7 @@ class Calibration:
         lines = (
             f"<Calibration of {self.robot.name}: control delay {self.parameters.delay}",
             f"error {self.error_before:.3g} before, {self.error:.3g} after",
-            *(*self.changes, *factors, *([self.suspicion] if self.suspicion else ())),
+            *(*self.contacts, *factors, *([self.suspicion] if self.suspicion else ())),
         )
         return "\n  ".join(map(str, lines)) + ">"
 
@@ -136,16 +126,12 @@ class Calibration:
         return values_by_name(title, label, names, list(factors), ends=ends, reference=1.0)
 
     @property
-    def changes(self) -> tuple[str, ...]:
-        """Lines on the physics step and on the contacts, if the fit changed them."""
-        fitted, lines = self.parameters, list[str]()
-        if fitted.finer > 1:
-            step = 1e3 * self.robot.model.opt.timestep
-            lines += [f"physics step: {step:g} ms, {fitted.finer * step:g} ms before"]
-        if fitted.has_other_contacts:
-            stiffness, damping = fitted.contact_stiffness, fitted.contact_damping
-            lines += [f"contacts: stiffness x {stiffness:g}, damping x {damping:g}"]
-        return tuple(lines)
+    def contacts(self) -> tuple[str, ...]:
+        """A line on the contacts, if the fit changed them."""
+        if not self.parameters.has_other_contacts:
+            return ()
+        stiffness, damping = self.parameters.contact_stiffness, self.parameters.contact_damping
+        return (f"contacts: stiffness x {stiffness:g}, damping x {damping:g}",)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -172,7 +158,6 @@ def calibrate(
     known: Known | None = None,
     *,
     hypotheses: Sequence[Hypothesis] = (),
-    physics_step: float | None = None,
 ) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
@@ -190,9 +175,7 @@ def calibrate(
 
     The ``observer`` is called with the progress of the fit. ``known`` are predictions of trials in
     earlier calibrations of the same robot, to which those of this one are added. ``hypotheses`` are
-    the faults of the robot in each trial; in all it was healthy by default. ``physics_step``, s, is
-    that of the self-model, a part of the robot's; without one, the trials choose between the
-    robot's own and half of it.
+    the faults of the robot in each trial; in all it was healthy by default.
 
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
@@ -202,27 +185,18 @@ def calibrate(
         raise InputError("expected at least one trial of the healthy robot, got none")
     with threadpool_limits(1, "blas"):  # several round sums differently
         most = expected_models(robot)
-        given = list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True))
-        predictions, stats = {} if known is None else known, SimulationStats()
-
-        def segments_of(own: Robot) -> SegmentErrors:
-            segments = _segment_errors(own, given, threads, predictions)
-            return replace(segments, stats=stats, on_models=on_models)
-
-        def on_models(done: int) -> None:
-            observer(Progress(STAGE, min(done, most), most))
-
-        own_step = float(robot.model.opt.timestep)
-        segments, finer = segments_of(robot), round(own_step / (physics_step or own_step))
-        first = nominal_fit(segments)
-        before, prior = first.errors, first.deviations
-        is_exact = root_mean_square(before) < EXACT_ERROR and finer == 1
-        is_free = physics_step is None and not (is_exact or robot.has_fixed_base)
-        if is_free and needs_finer_step(segments, segments_of(robot.finer(FINER))):
-            finer = FINER
-        if finer > 1:
-            segments = segments_of(robot.finer(finer))
-        best = first if is_exact else nested_fits(segments, nominal_fit(segments))[-1]
+        segments = _segment_errors(
+            robot,
+            list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True)),
+            threads,
+            {} if known is None else known,
+            lambda done: observer(Progress(STAGE, min(done, most), most)),
+        )
+        before = segments.of([nominal(robot)])[:, 0]
+        prior = model_factors.prior_deviations(robot)
+        first = Fit(NOMINAL, nominal(robot), prior, before, before)
+        is_exact = root_mean_square(before) < EXACT_ERROR
+        best = first if is_exact else nested_fits(segments, first)[-1]
         if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
@@ -235,10 +209,9 @@ def calibrate(
         )
         observer(Progress(STAGE, most, most))
         loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, first))
-        is_fixed, parameters = robot.has_fixed_base, replace(best.parameters, finer=finer)
-        is_nominal = best.name == NOMINAL and finer == 1
+        is_fixed, parameters = robot.has_fixed_base, best.parameters
         return Calibration(
-            robot=robot if is_nominal else model_factors.with_parameters(robot, parameters),
+            robot=robot if best is first else model_factors.with_parameters(robot, parameters),
             parameters=parameters,
             deviations=deviations,
             error_before=float(root_mean_square(before)),
@@ -286,6 +259,7 @@ def _segment_errors(
     trials: Sequence[tuple[Trial, Hypothesis]],
     threads: int,
     known: Known,
+    on_models: Callable[[int], None] = lambda _: None,
 ) -> SegmentErrors:
     # Long trials share the time that is simulated of one.
     lengths = [float(np.ptp(trial.trajectory.time)) for trial, _ in trials]
@@ -293,12 +267,12 @@ def _segment_errors(
     data = []
     for (trial, hypothesis), length in zip(trials, lengths, strict=True):
         following = share if length > MAX_CHAIN else MAX_FOLLOWING
-        key = (trial.content, following, hypothesis, robot.model.opt.timestep)
+        key = (trial.content, following, hypothesis)
         if key not in known:
             segments = observed_segments(robot, trial, following)
             known[key] = replace(segments, hypothesis=hypothesis)
         data.append(known[key])
-    return SegmentErrors(robot, data, threads)
+    return SegmentErrors(robot, data, threads, on_models)
 
 
 def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:

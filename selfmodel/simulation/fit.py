@@ -4,7 +4,7 @@ The sets grow: none; the control delay; the stiffness and damping of contacts; f
 chosen only if it predicts segments that were left out of its fit significantly better than the set
 chosen before. Delay and contacts are found by exhaustive search; factors by a box-constrained
 nonlinear least squares (``mujoco.minimize``) with a Gaussian prior for those that the trials do not
-determine. The physics step is chosen before (``needs_finer_step``).
+determine.
 
 A robot with a floating base has one set of factors. With a fixed base, which determines neither
 masses nor the friction of the ground, nor has contacts, there are three: gain, damping, dry
@@ -29,7 +29,6 @@ from selfmodel.simulation.model_factors import (
     Basis,
     Parameters,
     bases,
-    nominal,
     prior_deviations,
 )
 from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
@@ -44,12 +43,6 @@ CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
 FRICTION_STEP = 0.9
 """Factor from one friction to the next once contacts have changed: a step of a third of the prior's
 deviation."""
-
-FINER, FINER_MIN_Z, MIN_GAIN_OF_FINER = 2, 3.5, 0.1
-"""Physics steps in place of one, which multiply the cost of a simulation; and standard errors and
-relative reduction of the loss for which they do, at least. The finer step was taken in 21 of 27
-recordings of robots with a finer step than the model, and in none of 31 of robots with the model's
-own, of which some gained 16 % or 5.6 standard errors: a coarse step amplifies noise."""
 
 FOLDS = 4
 """Consecutive parts of each trial that are left out in turn."""
@@ -138,7 +131,28 @@ def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
 
 def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
     """Returns the nominal set, then each nested set that was chosen; the last is the best."""
-    robot, (chosen, best) = segments.robot, _before_factors(segments, first)
+    robot, best, chosen = segments.robot, first.parameters, [first]
+
+    def choose(fit: Fit, min_z: float) -> bool:
+        losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
+        better = is_better(losses, others, min_z)
+        chosen.extend([fit] * better)
+        return better
+
+    if not robot.has_fixed_base:
+        delays = [replace(best, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
+        whole = _best_candidate(DELAY, segments, delays, first)
+        choose(whole, MIN_Z)
+        part = _part_delay(segments, whole)
+        fit = part if choose(part, MIN_Z) else whole
+        best = fit.parameters
+        contacts = [
+            replace(best, contact_stiffness=stiffness, contact_damping=damping)
+            for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
+        ]
+        fit = _best_candidate(CONTACTS, segments, contacts, fit)
+        if choose(fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
+            best = fit.parameters
     limited = robot.has_fixed_base and _reaches_limits(segments, best)
     for number, (name, basis) in enumerate(bases(robot, reaches_limits=limited)):
         fitter = _Fitter(segments, basis, FIXED if robot.has_fixed_base else FLOATING)
@@ -152,66 +166,9 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             points[:0] = [(near, basis.coordinates(near), errors)] * (near != best)
         for point, x, errors in points:
             is_lower = _cost(errors) < _cost(chosen[-1].errors)
-            if is_lower and _choose(chosen, segments, fitter.tested(name, point, x, errors), MIN_Z):
+            if is_lower and choose(fitter.tested(name, point, x, errors), MIN_Z):
                 break
     return chosen
-
-
-def _before_factors(segments: SegmentErrors, first: Fit) -> tuple[list[Fit], Parameters]:
-    """Returns the nominal set, those of delay and contacts that were chosen, and the best values.
-
-    The best delay is the start of the factors, significant or not. A fixed base has the nominal set
-    alone.
-    """
-    chosen, steps = [first], range(MAX_CONTROL_DELAY + 1)
-    if segments.robot.has_fixed_base:
-        return chosen, first.parameters
-    delays = [replace(first.parameters, delay=delay) for delay in steps]
-    whole = _best_candidate(DELAY, segments, delays, first)
-    _choose(chosen, segments, whole, MIN_Z)
-    part = _part_delay(segments, whole)
-    fit = part if _choose(chosen, segments, part, MIN_Z) else whole
-    contacts = [
-        replace(fit.parameters, contact_stiffness=stiffness, contact_damping=damping)
-        for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
-    ]
-    best, min_z = _best_candidate(CONTACTS, segments, contacts, fit), CONTACTS_MIN_Z
-    is_chosen = _choose(chosen, segments, best, min_z * np.sqrt(segments.overlap))
-    return chosen, (best if is_chosen else fit).parameters
-
-
-def _choose(chosen: list[Fit], segments: SegmentErrors, fit: Fit, min_z: float) -> bool:
-    """Adds a fit to the chosen ones if it predicts left-out segments better than the last."""
-    losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
-    better = is_better(losses, others, min_z)
-    chosen.extend([fit] * better)
-    return better
-
-
-def nominal_fit(segments: SegmentErrors) -> Fit:
-    """Returns the nominal parameters, with the errors of their predictions."""
-    parameters, deviations = nominal(segments.robot), prior_deviations(segments.robot)
-    errors = segments.of([parameters])[:, 0]
-    return Fit(NOMINAL, parameters, deviations, errors, errors)
-
-
-def needs_finer_step(segments: SegmentErrors, finer: SegmentErrors) -> bool:
-    """Returns whether a finer physics step predicts trials better than the robot's own does.
-
-    Within a step, a model keeps the forces of contacts and servos as they are; a robot does not.
-    The finer one has to be better with the delay that fits the robot's own, and the better of the
-    contacts that do and of the nominal ones: fitted contacts may make up for a coarse step.
-
-    Args:
-        segments: The trials by the robot with its own step; its base floats.
-        finer: The trials by the robot with the finer step.
-    """
-    _, known = _before_factors(segments, nominal_fit(segments))
-    tried = [known, replace(nominal(segments.robot), delay=known.delay)]
-    losses = segments.losses(segments.of([known])[:, 0])
-    lower = min(map(finer.losses, finer.of(tried).T), key=np.mean)
-    is_gain = lower.mean() <= (1 - MIN_GAIN_OF_FINER) * losses.mean()
-    return is_gain and is_better(lower, losses, FINER_MIN_Z * np.sqrt(segments.overlap))
 
 
 def expected_models(robot: Robot) -> int:
@@ -223,8 +180,7 @@ def expected_models(robot: Robot) -> int:
     else:
         method, tried = FLOATING, 0
         count += delays + 2 * (delay_parts(robot).bit_length() - 1)
-        # Neighbours of the contacts, too, and two with the finer step.
-        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 11
+        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 9  # and neighbours
     for _, basis in bases(robot):
         width = len(basis.prior)
         slopes = 2 * width if method.is_central else width

@@ -52,7 +52,6 @@ class Parameters:
         armature: Factor of the armature of each hinge, in the same way.
         body_mass: Further factor of the mass of each body.
         body_inertia: Further factor of the inertia of each body.
-        finer: Physics steps in place of each of the robot's own.
     """
 
     root_mass: float = 1.0
@@ -69,7 +68,6 @@ class Parameters:
     armature: tuple[float, ...] = ()
     body_mass: tuple[float, ...] = ()
     body_inertia: tuple[float, ...] = ()
-    finer: int = 1
 
     @property
     def has_other_contacts(self) -> bool:
@@ -167,7 +165,7 @@ def model_with_parameters(
 ) -> mujoco.MjModel:
     """Returns a copy of the robot's own or an edited model with scaled parameters.
 
-    The control delay and the physics step are unchanged.
+    The control delay is unchanged.
     """
     model = robot.model if model is None else model
     masses = np.full(model.nbody, parameters.limb_mass)
@@ -215,9 +213,8 @@ def joint_values(robot: Robot, parameters: Parameters, quantity: str) -> FloatAr
 def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     """Returns a robot whose MJCF has scaled parameters and their control delay, to six digits.
 
-    It has their physics step. Contacts other than the robot's own are marked as fitted.
+    Contacts other than the robot's own are marked as fitted.
     """
-    robot = robot.finer(parameters.finer)
     fitted = with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
     if robot.has_fitted_contacts or not parameters.has_other_contacts:
         return fitted

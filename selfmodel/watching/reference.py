@@ -118,7 +118,7 @@ def reference_of(
     comparator: SegmentPrediction,
     fitted: Callable[[Sequence[Trial]], Robot],
 ) -> Reference:
-    """Returns what healthy trials show of a self-model, compared with ones ``fitted`` to others.
+    """Returns what healthy trials show of a robot, compared with self-models ``fitted`` to others.
 
     Raises:
         InputError: The trials are too short.
@@ -148,7 +148,7 @@ def reference_of(
     names, every = robot.anatomy.names, np.concatenate(stretches)
     first_signal = len(names.hinges) + len(names.sensors)
     return Reference(
-        robot=robot,
+        robot=fitted(trials),
         channels=channels,
         scores=np.sort(every, axis=0),
         margins=_margins(stretches),

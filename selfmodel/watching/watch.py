@@ -104,15 +104,10 @@ class Watch:
         self._horizon = max(COMPARISONS, round(SEGMENT / self._step))
         self._comparator = dataclasses.replace(chosen, horizon=self._horizon, only_last=True)
 
-        whole = arguments.fitted(robot, trials, count).robot if calibrate else robot
-
         def fitted(parts: Sequence[Trial]) -> Robot:
-            if not calibrate:
-                return robot
-            step = float(whole.model.opt.timestep)
-            return arguments.fitted(robot, parts, count, physics_step=step).robot
+            return arguments.fitted(robot, parts, count).robot if calibrate else robot
 
-        self._reference = reference_of(whole, trials, self._comparator, fitted)
+        self._reference = reference_of(robot, trials, self._comparator, fitted)
         self._space = HypothesisSpace.of(arguments.kinds_of(kinds), robot.anatomy)
         self._simulator = Simulator(self._reference.robot, count)
         self._run_length = every / (self._step * self._horizon)

@@ -62,8 +62,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write(made / "exact.mcap", quadruped)
     contacts = replace(nominal(quadruped), contact_stiffness=2.0, contact_damping=0.25)
     write(made / "hard.mcap", quadruped, physical=with_parameters(quadruped, contacts))
-    finer = with_parameters(quadruped, replace(nominal(quadruped), finer=4))
-    write(made / "finer.mcap", quadruped, physical=finer)
     write(made / "other.mcap", ROBOTS["hexapod"].robot())
     (made / "taken.xml").write_text("mine", encoding="utf-8")
     return made
@@ -102,16 +100,6 @@ def test_contacts_that_were_changed_are_printed_and_in_the_model(folder: Path):
 
     assert "contacts: stiffness x 2, damping x 0.25" in done.stdout
     assert 'solref="-10000 -75"' in (folder / "hard.xml").read_text(encoding="utf-8")
-
-
-@pytest.mark.search
-def test_a_physics_step_that_was_halved_is_printed_and_in_the_model(folder: Path):
-    done = succeeds("calibrate", "finer.mcap", "-o", "finer.xml", cwd=folder)
-    found = printed("calibrate", "finer.mcap", "-o", "again.xml", "--json", cwd=folder)
-
-    assert "physics step: 2.5 ms, 5 ms before" in done.stdout
-    assert 'timestep="0.0025"' in (folder / "finer.xml").read_text(encoding="utf-8")
-    assert (found["physics_step"], found["physics_step_before"]) == (0.0025, 0.005)
 
 
 @pytest.mark.parametrize(

@@ -69,10 +69,7 @@ def problem_of(
     robot = load_robot("quadruped")
     trials = trial if isinstance(trial, list) else [trial]
 
-    def calibrated(
-        _: Sequence[Trial], hypotheses: Sequence[Hypothesis], physics_step: float
-    ) -> SimpleNamespace:
-        assert physics_step == table.physics_step
+    def calibrated(_: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> SimpleNamespace:
         assert [*hypotheses[: len(healthy)]] == [INTACT] * len(healthy)
         return SimpleNamespace(robot=refit or robot)
 

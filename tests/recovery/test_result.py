@@ -84,7 +84,6 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
         "delay": 2,
         "contact_stiffness": 1.0,
         "contact_damping": 1.0,
-        "finer": 1,
         "deviations": [0.15] * 12,
         "error_before": 0.75,
         "error": 0.5,

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from selfmodel import load_robot
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
 from selfmodel.files import file_digest
@@ -120,16 +119,6 @@ def test_a_result_without_what_a_report_needs_is_refused_by_its_key(
     path.write_text((run / "result.json").read_text().replace('"seed": 0', '"seed": 1'))
     with pytest.raises(InputError, match=r"result\.json.* digest"):
         subject_of_run(folder)
-
-
-def test_a_self_model_of_which_only_the_step_was_fitted_is_made_again(run: Path, tmp_path: Path):
-    def halved(values: dict) -> None:
-        values["calibration"].update(set="nominal", finer=2, root_mass=1.0)
-
-    robot = subject_of_run(changed(run, tmp_path / "run", halved), threads=1).calibration.robot
-
-    assert robot.model.opt.timestep == 0.5 * load_robot("quadruped").model.opt.timestep
-    assert robot.is_calibrated
 
 
 @pytest.mark.parametrize("key", ["comparator", "kinds"])
