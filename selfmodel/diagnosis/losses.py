@@ -152,7 +152,8 @@ class LossTable:
         """
         robot, threads, known = self._simulator.robot, self._simulator.threads, self._sensitivity
         faults = Hypothesis(tuple(hypothesis.lacking(hypothesis.spec_part)))
-        for trial in (trials := [part.rows for part in parts if part.rows.trajectory.steps]):
+        trials = [rows for rows in (part.rows for part in parts) if rows.trajectory.steps]
+        for trial in trials:
             if (trial.content, faults) not in known:
                 known[trial.content, faults] = 0.0
                 with suppress(InputError):
