@@ -431,8 +431,8 @@ def diagnosis_of_logs(
     check_known(hypothesis, settings)
     chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
     on_event(chosen)
-    fitted = partial(arguments.fitted, robot, threads=count, observer=on_event, known={})
-    fit = fitted(healthy) if calibrate and healthy else None
+    is_fitted = calibrate and len(healthy) > 0
+    fit = arguments.fitted(robot, healthy, count, on_event) if is_fitted else None
     if fit is not None:
         on_event(fit)
     search = DiagnosticSearch(
@@ -441,7 +441,7 @@ def diagnosis_of_logs(
         settings,
         kinds,
         healthy_trials=healthy,
-        calibrate=fitted if fit else None,
+        refit=calibration.Refit(robot, fit, count) if fit else None,
     )
     drawn = damaged[0].plan.seed if seed is None else seed
     found = recovery_loop.diagnose_trials(damaged, search, drawn, on_event, hypothesis=hypothesis)

@@ -32,7 +32,7 @@ from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_sett
 from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import Calibration, Known, calibrate
+from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.tasks import Entry, entry
 from selfmodel.trials.signals import Names
 from selfmodel.trials.trial import Trial
@@ -268,9 +268,6 @@ def fitted(
     trials: Sequence[Trial],
     threads: int,
     observer: Observer = ignore,
-    known: Known | None = None,
-    *,
-    hypotheses: Sequence[Hypothesis] = (),
 ) -> Calibration:
     """Returns a self-model fitted to healthy trials, for callers that calibrate by default.
 
@@ -278,7 +275,7 @@ def fitted(
         InputError: The fit failed; the message names the option that omits calibration.
     """
     try:
-        return calibrate(robot, trials, threads, observer, known, hypotheses=hypotheses)
+        return calibrate(robot, trials, threads, observer)
     except InputError as error:
         raise InputError(
             f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"

@@ -172,7 +172,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
             self-model that is not calibrated.
     """
     healthy, reference, reason = problem.healthy_trials, _reference(accused, fit, problem), ""
-    is_comparable = problem.calibrate is not None and problem.healthy([INTACT]) is not None
+    is_comparable = problem.refit is not None and problem.healthy([INTACT]) is not None
     # In the same movement of a healthy robot, the error of the self-model is on both sides.
     is_told = problem.contrast(accused) >= significance.MIN_Z_ACROSS_TRIALS
     if not is_comparable or is_told:
@@ -262,7 +262,7 @@ def supported(best: Hypothesis, problem: Problem) -> tuple[Hypothesis, Problem]:
     Nothing is left out of a hypothesis that does not explain the trials: a fault is missing.
     """
     rest, by_refit = best, problem
-    if problem.calibrate is None or problem.healthy([INTACT]) is None or len(best) < 2:
+    if problem.refit is None or problem.healthy([INTACT]) is None or len(best) < 2:
         return best, problem
     if best.spec_part or is_too_high(fit_of(best, problem)):  # a fit has the compiled model
         return best, problem

@@ -28,7 +28,7 @@ from selfmodel.diagnosis.losses import (
     LossTable,
     Timeline,
 )
-from selfmodel.diagnosis.problem import Calibrate, Problem
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.search import (
     LocalSearch,
     by_distance,
@@ -45,6 +45,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, suitable
 from selfmodel.progress import Progress
 from selfmodel.settings import EA, STEPWISE, Settings
+from selfmodel.simulation.calibration import Refit
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPart, trial_names
 
@@ -70,8 +71,8 @@ class DiagnosticSearch:
             searched too, but for robots with a fixed base.
         healthy_trials: Trials of the healthy robot, which measure the loss of a correct model;
             without any, no verdict is ``unexplained``.
-        calibrate: Fits the self-model to some trials, by which an accusation is checked
-            (``adequacy``); None for a self-model that is given as it is.
+        refit: Fits the self-model again, by which an accusation is checked (``adequacy``); None
+            for a self-model that is given as it is.
 
     Attributes:
         losses: Losses of hypotheses on the trials.
@@ -89,9 +90,9 @@ class DiagnosticSearch:
         kinds: Sequence[FaultKind] = PAPER_KINDS,
         *,
         healthy_trials: Sequence[Trial] = (),
-        calibrate: Calibrate | None = None,
+        refit: Refit | None = None,
     ) -> None:
-        self._calibrate = calibrate
+        self._refit = refit
         self._settings = settings
         self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
         # On a real servo on a bench, a load was found in the place of lost torque, and damping in
@@ -143,7 +144,7 @@ class DiagnosticSearch:
             healthy_trials=self._healthy_trials,
             names=trial_names(trials),
             settings=self._settings,
-            calibrate=self._calibrate,
+            refit=self._refit,
             observer=observer,
         )
         shown = evident(problem.standing, problem.space) if how != EA else []

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -19,18 +18,8 @@ from selfmodel.faults.joints import LOCKED_LEG, SERVO_GAIN, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
 from selfmodel.progress import Observer, ignore
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.calibration import Refit
 from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
-
-
-class Calibrate(Protocol):
-    """Fits the self-model to trials, given the faults of the robot in each; none by default."""
-
-    def __call__(
-        self, trials: Sequence[Trial], *, hypotheses: Sequence[Hypothesis] = ()
-    ) -> Calibration:
-        """Returns the fit."""
-
 
 MIN_SURROGATE_PIECES = 2
 """Pieces of the surrogate comparator that a search in a part of the trials needs."""
@@ -55,7 +44,7 @@ class Problem:
     Attributes:
         surrogate: Losses of the surrogate comparator, and its trials; see ``LossTable.surrogate``.
         names: Names of the trials of the whole diagnosis, by path.
-        calibrate: Fits the self-model to some trials; None for one that is given as it is.
+        refit: Fits the self-model again; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
         standing: Joints that stand in the trials though they are commanded to move, with which the
             search begins; none if the comparator does not predict segments.
@@ -68,7 +57,7 @@ class Problem:
     healthy_trials: Sequence[TrialPart]
     names: Mapping[str, str]
     settings: Settings
-    calibrate: Calibrate | None = None
+    refit: Refit | None = None
     healthy_parts: Sequence[TrialPart] = ()
     observer: Observer = ignore
     standing: frozenset[str] = field(init=False)
@@ -143,12 +132,11 @@ class Problem:
         if hypothesis not in self._refits:
             every = [part.rows for part in (*self.healthy_trials, *self.trials)]
             faults = [INTACT] * len(self.healthy_trials) + [hypothesis] * len(self.trials)
-            refit = None
-            if self.calibrate is not None:
+            found = None
+            if self.refit is not None:
                 with suppress(InputError):
-                    robot = self.calibrate(every, hypotheses=faults).robot
-                    refit = replace(self, table=self.table.of_robot(robot))
-            self._refits[hypothesis] = refit
+                    found = replace(self, table=self.table.of_robot(self.refit(every, faults)))
+            self._refits[hypothesis] = found
         return self._refits[hypothesis]
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:

@@ -16,7 +16,6 @@ from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch, check_known
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.losses import check_limit, still_trial
-from selfmodel.diagnosis.problem import Calibrate
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
@@ -39,7 +38,7 @@ from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import RepairSettings, Settings
-from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.calibration import Calibration, Refit
 from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
@@ -100,7 +99,7 @@ class RecoveryLoop:
     design: Design | None = None
     kinds: Sequence[FaultKind] = DEFAULT_KINDS
     hypothesis: Hypothesis = INTACT
-    calibrate: Calibrate | None = None
+    calibrate: Callable[[Sequence[Trial]], Calibration] | None = None
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
     make_repair: repairs.MakeRepair = repairs.RobustRepair
@@ -150,7 +149,7 @@ class RecoveryLoop:
         search = DiagnosticSearch(
             *(self.simulator, comparator.comparator, self.settings, self.kinds),
             healthy_trials=self.trials[:1],
-            calibrate=self.calibrate,
+            refit=Refit(robot, calibration, self.simulator.threads) if calibration else None,
         )
         for left in range(self.settings.trials, 0, -1):
             self.trials_left = left

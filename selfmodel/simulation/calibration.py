@@ -1,10 +1,11 @@
-"""Calibration of the self-model: fits its continuous parameters to trials of known faults.
+"""Calibration of the self-model: fits its continuous parameters to trials of the healthy robot.
 
-See ``fit`` for the sets of parameters, their fit and its test.
+``Refit`` fits them again, to these and to trials with known faults. See ``fit`` for the sets of
+parameters, their fit and its test.
 """
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,14 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
-from selfmodel.simulation.fit import NOMINAL, Fit, expected_models, is_determined, nested_fits
+from selfmodel.simulation.fit import (
+    NOMINAL,
+    Fit,
+    expected_models,
+    is_determined,
+    nested_fits,
+    refitted,
+)
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
 from selfmodel.simulation.requests import MAX_CHAIN
@@ -155,9 +163,6 @@ def calibrate(
     trials: Sequence[Trial],
     threads: int,
     observer: Observer = ignore,
-    known: Known | None = None,
-    *,
-    hypotheses: Sequence[Hypothesis] = (),
 ) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
@@ -173,9 +178,7 @@ def calibrate(
     With a fixed base, gain, damping, dry friction and armature are fitted to joint positions, and
     force limits that the trials reach.
 
-    The ``observer`` is called with the progress of the fit. ``known`` are predictions of trials in
-    earlier calibrations of the same robot, to which those of this one are added. ``hypotheses`` are
-    the faults of the robot in each trial; in all it was healthy by default.
+    The ``observer`` is called with the progress of the fit.
 
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
@@ -187,9 +190,9 @@ def calibrate(
         most = expected_models(robot)
         segments = _segment_errors(
             robot,
-            list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True)),
+            [(trial, INTACT) for trial in trials],
             threads,
-            {} if known is None else known,
+            {},
             lambda done: observer(Progress(STAGE, min(done, most), most)),
         )
         before = segments.of([nominal(robot)])[:, 0]
@@ -222,9 +225,38 @@ def calibrate(
             if best.is_fitted
             else (),
             held_out_gain=0.0 if is_exact else float(1 - loss / loss_before),
-            # A robot with faults is predicted badly for other reasons than its recording.
-            suspicion=None if is_exact or is_fixed or hypotheses else suspicion(segments, best),
+            suspicion=None if is_exact or is_fixed else suspicion(segments, best),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """Fits a self-model again, to trials of the healthy robot and others in which it has faults.
+
+    It starts from a calibration, whose delay and contacts stay; see ``fit.refitted``.
+
+    Attributes:
+        robot: The nominal robot, as before the calibration.
+        calibration: Its fit to the healthy trials.
+        threads: Threads of the simulations.
+    """
+
+    robot: Robot
+    calibration: Calibration
+    threads: int
+    _known: Known = field(default_factory=dict, init=False)
+
+    def __call__(self, trials: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> Robot:
+        """Returns the fitted robot, given its faults in each trial.
+
+        Raises:
+            InputError: Too little of a trial was observed.
+        """
+        given = list(zip(trials, hypotheses, strict=True))
+        with threadpool_limits(1, "blas"):  # as in ``calibrate``
+            segments = _segment_errors(self.robot, given, self.threads, self._known)
+            found = refitted(segments, self.calibration.parameters, self.calibration.chosen)
+        return model_factors.with_parameters(self.robot, found)
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:

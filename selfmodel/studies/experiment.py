@@ -214,7 +214,7 @@ def run_recovery(
     check_measurable(experiment.score, robot, observed_of(healthy, damaged))
     make_repair = plugins.repair(experiment.repair, experiment.search, experiment.repertoire)
     next_trial, kinds = plugins.next_trial(experiment.next_trial), experiment.kinds
-    calibrated, fit = experiment.calibrated, partial(fitted, robot, threads=threads, known={})
+    calibrated, fit = experiment.calibrated, partial(fitted, robot, threads=threads)
     make_run(folder := experiment.folder, calibrated=calibrated)
     return RecoveryLoop(
         simulator=Simulator(robot, threads, stats),

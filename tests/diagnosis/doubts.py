@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -69,11 +68,11 @@ def problem_of(
     robot = load_robot("quadruped")
     trials = trial if isinstance(trial, list) else [trial]
 
-    def calibrated(_: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> SimpleNamespace:
+    def refitted(_: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> Robot:
         assert [*hypotheses[: len(healthy)]] == [INTACT] * len(healthy)
-        return SimpleNamespace(robot=refit or robot)
+        return refit or robot
 
-    return synthetic.problem_of(table, robot, trials, healthy, DEFAULT_KINDS, calibrate=calibrated)
+    return synthetic.problem_of(table, robot, trials, healthy, DEFAULT_KINDS, refit=refitted)
 
 
 def doubted(problem: Problem, accused: str, ratio: float = 2.0) -> Doubt | None:

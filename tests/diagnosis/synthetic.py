@@ -6,13 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 
 from selfmodel.diagnosis.losses import LossFunction, LossTable
-from selfmodel.diagnosis.problem import Calibrate, Problem
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.progress import ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import Refit
 from selfmodel.trials.trial import Trial, TrialPart, trial_names, whole
 
 HingeLosses = Callable[[Sequence[Hypothesis]], np.ndarray]
@@ -25,7 +26,7 @@ def problem_of(
     healthy: Sequence[Trial | TrialPart],
     kinds: Sequence[FaultKind],
     *,
-    calibrate: Calibrate | None = None,
+    refit: Refit | None = None,
 ) -> Problem:
     """The problem of some trials of a robot."""
     return Problem(
@@ -36,7 +37,7 @@ def problem_of(
         [*map(whole, healthy)],
         trial_names(trials),
         Settings(),
-        calibrate=calibrate,
+        refit=refit,
     )
 
 
@@ -66,7 +67,7 @@ class Synthetic(Problem):
     ) -> None:
         self.space, self.settings = space, Settings(genes=most)
         self.trials, self.healthy_trials, self._observed = ["damaged"], [], ["healthy"]
-        self.losses, self.observer, self.calibrate = losses, ignore, None
+        self.losses, self.observer, self.refit = losses, ignore, None
         self.standing = frozenset[str]()
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before

@@ -2,8 +2,6 @@
 
 import dataclasses
 import re
-from collections.abc import Sequence
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +22,6 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.model_factors import model_with_parameters, nominal, with_model
 from selfmodel.trials.trial import Trial, TrialPart
 from tests.diagnosis.doubts import KNEE, WEAK, doubted, moved, problem_of, table_of, unlike
@@ -69,7 +66,7 @@ def table(quadruped: Robot) -> LossTable:
     return table_of(quadruped)
 
 
-def refused(_: Sequence[Trial], **__: object) -> Calibration:
+def refused(*_: object) -> Robot:
     raise InputError("too short")
 
 
@@ -116,8 +113,8 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
 
     problem, fits = problem_of(table, trials, before, fitted), []
     problem.is_long = is_long
-    calibrate = problem.calibrate
-    problem.calibrate = lambda *each, **known: fits.append(1) or calibrate(*each, **known)
+    given = problem.refit
+    problem.refit = lambda *each: fits.append(1) or given(*each)
     found, by_refit = supported(hypothesis, problem)
 
     assert str(found) == left
@@ -140,9 +137,7 @@ def test_a_fault_is_left_out_by_what_the_refits_predict_with_it_and_without(
     for beside_both in (weaker, quadruped):
         problem = problem_of(table, trials, before)
         robots = {JAM: weaker, both: beside_both}
-        problem.calibrate = lambda _, hypotheses, known=robots: SimpleNamespace(
-            robot=known[str(hypotheses[-1])]
-        )
+        problem.refit = lambda _, hypotheses, known=robots: known[str(hypotheses[-1])]
         found.append(str(supported(parse(both, quadruped.anatomy), problem)[0]))
 
     assert found == [both, JAM]
@@ -279,7 +274,7 @@ def test_a_self_model_that_is_given_as_it_is_makes_no_doubts(
     table: LossTable, healthy: list[Trial], weak: Trial, weaker: Robot
 ):
     problem = problem_of(table, weak, healthy, weaker)
-    problem.calibrate = None
+    problem.refit = None
 
     assert doubted(problem, WEAK) is None
 
@@ -302,7 +297,7 @@ def test_the_refit_is_to_the_healthy_trials_and_those_to_explain(
 ):
     fitted: list[Trial] = []
     problem = problem_of(table, weak, healthy, weaker)
-    problem.calibrate = lambda every, **_: fitted.extend(every) or SimpleNamespace(robot=weaker)
+    problem.refit = lambda every, _: fitted.extend(every) or weaker
 
     assert doubted(problem, WEAK) is not None
     assert [one.content for one in fitted] == [one.content for one in [*healthy, weak]]
@@ -312,7 +307,7 @@ def test_a_refit_that_spoils_the_healthy_trials_explains_nothing(
     table: LossTable, quadruped: Robot, real: Robot, healthy: list[Trial], weak: Trial
 ):
     exact = problem_of(table_of(real), weak, healthy)
-    exact.calibrate = lambda *_, **__: SimpleNamespace(robot=unlike(quadruped, 0.5))
+    exact.refit = lambda *_: unlike(quadruped, 0.5)
 
     assert doubted(problem_of(table, weak, healthy, unlike(quadruped, 0.5)), WEAK) is not None
     assert doubted(exact, WEAK) is None
@@ -322,7 +317,7 @@ def test_trials_that_are_too_short_for_a_refit_are_not_judged(
     table: LossTable, healthy: list[Trial], weak: Trial
 ):
     problem = problem_of(table, weak, healthy)
-    problem.calibrate = refused
+    problem.refit = refused
     doubt = doubted(problem, WEAK)
 
     assert doubt is not None
@@ -433,7 +428,7 @@ def test_a_fault_that_explains_the_whole_loss_has_to_beat_a_refit_in_faster_moti
 
     assert doubted(problem, BROKEN) is None
     assert doubted(problem, BROKEN, 1.0) is not None  # no loss that a fault could explain
-    problem = dataclasses.replace(problem, calibrate=refused)
+    problem = dataclasses.replace(problem, refit=refused)
     doubt = doubted(problem, BROKEN)
     assert doubt is not None
     assert "too short for a fit" in doubt.reason
@@ -455,10 +450,10 @@ def test_the_time_before_a_change_shows_its_gait_as_healthy(
 def test_no_refit_is_made_where_the_gaits_decide(
     table: LossTable, healthy: list[Trial], weak: Trial
 ):
-    def unexpected(_: Sequence[Trial], **__: object) -> Calibration:
+    def unexpected(*_: object) -> Robot:
         raise AssertionError("a refit takes seconds")
 
     problem = problem_of(table, weak, healthy[:1])
-    problem.calibrate = unexpected
+    problem.refit = unexpected
 
     assert doubted(problem, WEAK) is not None

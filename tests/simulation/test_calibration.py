@@ -1,7 +1,6 @@
 """Promises of calibration: it finds what a robot has, and leaves alone what is right."""
 
 import dataclasses
-from collections.abc import Hashable
 from functools import cache
 from pathlib import Path
 from unittest.mock import Mock
@@ -19,7 +18,13 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import calibration, fit, segments
-from selfmodel.simulation.calibration import EXACT_ERROR, Calibration, calibrate, prediction_error
+from selfmodel.simulation.calibration import (
+    EXACT_ERROR,
+    Calibration,
+    Refit,
+    calibrate,
+    prediction_error,
+)
 from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import (
     FACTORS,
@@ -31,7 +36,6 @@ from selfmodel.simulation.model_factors import (
     prior_deviations,
     with_parameters,
 )
-from selfmodel.simulation.segments import ObservedSegments
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import BASE
 from selfmodel.trials.signals import Signal
@@ -94,17 +98,31 @@ def test_delay_and_factors_go_from_nominal_towards_the_truth():
 def test_the_faults_of_the_robot_in_a_trial_are_no_parameters_of_its_model():
     jam = parse("jam:back_left_knee", QUADRUPED.anatomy)
     damaged = moving_trial(real(), SimulatedRobot(real(), jam), 0)
+    every, refit = [*trials(real()), damaged], Refit(QUADRUPED, fitted(), 1)
     knowing, unknowing = (
-        calibrate(QUADRUPED, [damaged], threads=1, hypotheses=[each]) for each in (jam, INTACT)
+        refit(every, [*[INTACT] * (len(every) - 1), fault]) for fault in (jam, INTACT)
     )
-    off, worse = (
-        np.abs(np.log(one.parameters.factors) - np.log(TRUE.factors)).sum()
-        for one in (knowing, unknowing)
-    )
+    seen, unseen = trials(real()), [moving_trial(real(), SimulatedRobot(real()), 7)]
 
-    assert knowing.error < 0.3 * unknowing.error
-    assert off < worse
-    assert knowing.parameters.delay == TRUE.delay
+    for healthy in (seen, unseen):
+        error, *others = (
+            prediction_error(robot, healthy, 1) for robot in (knowing, fitted().robot, unknowing)
+        )
+        assert error < 1.1 * others[0]
+        assert error < 0.8 * others[1]
+
+
+@search
+def test_a_refit_follows_further_trials_with_the_delay_and_the_contacts_of_the_fit():
+    worn = with_parameters(QUADRUPED, dataclasses.replace(TRUE, friction=1.2))
+    further = moving_trial(worn, SimulatedRobot(worn), 3)
+    (refit,) = (Refit(QUADRUPED, fitted(), 1)([further], [INTACT]),)
+
+    before, after = (prediction_error(robot, [further], 1) for robot in (fitted().robot, refit))
+    assert after < 0.9 * before
+    assert refit.control_delay == fitted().parameters.delay
+    assert (refit.model.geom_solref == fitted().robot.model.geom_solref).all()
+    assert prediction_error(QUADRUPED, [further], 1) > after
 
 
 @search
@@ -158,29 +176,31 @@ def test_long_trials_without_the_base_share_the_time_that_is_simulated_of_one(
 ):
     monkeypatch.setattr(calibration, "MAX_CHAIN", 1.0)
     monkeypatch.setattr(calibration, "MAX_FOLLOWING", 2.0)
-    known, long = (
-        dict[Hashable, ObservedSegments](),
-        [lacking(one, BASE) for one in trials(real(), 2)],
-    )
-    calibrate(QUADRUPED, long, 1, known=known)
-    steps = [one.segments.horizon * len(one.segments.starts) for one in known.values()]
+    cut = Mock(wraps=calibration.observed_segments)
+    monkeypatch.setattr(calibration, "observed_segments", cut)
+    long = [lacking(one, BASE) for one in trials(real(), 2)]
+    prediction_error(QUADRUPED, long, 1)
+    segments_of = [segments.observed_segments(*call.args).segments for call in cut.call_args_list]
 
-    assert steps == [STEPS // 2, STEPS // 2]
+    assert [one.horizon * len(one.starts) for one in segments_of] == [STEPS // 2, STEPS // 2]
 
 
 @search
-def test_what_an_earlier_calibration_predicted_of_a_trial_is_not_simulated_again(
+def test_what_a_refit_predicted_of_a_trial_is_not_simulated_again_by_the_next(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    known, given = dict[Hashable, ObservedSegments](), trials(real())
-    first = calibrate(QUADRUPED, given, 1, known=known)
+    refit, given = Refit(QUADRUPED, fitted(), 1), trials(real(), 2)
+    weak = parse("motor:back_left_knee=0.9", QUADRUPED.anatomy)
+    first = refit(given, [INTACT, weak])
     predicted = Mock(wraps=segments.predict)
     monkeypatch.setattr(segments, "predict", predicted)
-    again = calibrate(QUADRUPED, given, 1, known=known)
 
-    assert again.parameters == first.parameters
-    (call,) = predicted.call_args_list
-    assert len(call.args[1]) == 2 * len(PRIOR), "the independent segments around the fit"
+    assert refit(given, [INTACT, weak]).mjcf == first.mjcf
+    assert not predicted.call_args_list
+    refit(given, [INTACT, INTACT])
+    models = [len(call.args[1]) for call in predicted.call_args_list]
+    assert sum(models) >= 2 * len(PRIOR) + 1, "of the other trial, the fit and its slopes"
+    assert sum(models) < 2 * (2 * len(PRIOR) + 1), "of both"
 
 
 @search
