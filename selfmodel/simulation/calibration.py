@@ -233,7 +233,7 @@ def calibrate(
 class Refit:
     """Fits a self-model again, to trials of the healthy robot and others in which it has faults.
 
-    It starts from a calibration, whose delay and contacts stay; see ``fit.refitted``.
+    It starts from a calibration, whose delay stays; see ``fit.refitted``.
 
     Attributes:
         robot: The nominal robot, as before the calibration.
