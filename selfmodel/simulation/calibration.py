@@ -136,9 +136,9 @@ class Calibration:
     @property
     def contacts(self) -> tuple[str, ...]:
         """A line on the contacts, if the fit changed them."""
-        if not self.parameters.has_other_contacts:
+        stiffness, damping = self.parameters.contacts
+        if (stiffness, damping) == (1.0, 1.0):
             return ()
-        stiffness, damping = self.parameters.contact_stiffness, self.parameters.contact_damping
         return (f"contacts: stiffness x {stiffness:g}, damping x {damping:g}",)
 
     @property

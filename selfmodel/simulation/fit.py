@@ -135,6 +135,7 @@ def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
 def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
     """Returns the nominal set, then each nested set that was chosen; the last is the best."""
     robot, best, chosen = segments.robot, first.parameters, [first]
+    contacts_min_z = CONTACTS_MIN_Z * float(np.sqrt(segments.overlap))
 
     def choose(fit: Fit, min_z: float) -> bool:
         losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
@@ -154,7 +155,7 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
         ]
         fit = _best_candidate(CONTACTS, segments, contacts, fit)
-        if choose(fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
+        if choose(fit, contacts_min_z):
             best = fit.parameters
     limited = robot.has_fixed_base and _reaches_limits(segments, best)
     for number, (name, basis) in enumerate(bases(robot, reaches_limits=limited)):
@@ -168,8 +169,10 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             near, errors = _with_near_contacts(segments, best, points[0][2])
             points[:0] = [(near, basis.coordinates(near), errors)] * (near != best)
         for point, x, errors in points:
+            is_new = chosen[-1].parameters.contacts == (1.0, 1.0) != point.contacts
+            min_z = contacts_min_z if is_new else MIN_Z
             is_lower = _cost(errors) < _cost(chosen[-1].errors)
-            if is_lower and choose(fitter.tested(name, point, x, errors), MIN_Z):
+            if is_lower and choose(fitter.tested(name, point, x, errors), min_z):
                 break
     return chosen
 

@@ -70,9 +70,9 @@ class Parameters:
     body_inertia: tuple[float, ...] = ()
 
     @property
-    def has_other_contacts(self) -> bool:
-        """Whether contacts differ from the robot's own."""
-        return (self.contact_stiffness, self.contact_damping) != (1.0, 1.0)
+    def contacts(self) -> tuple[float, float]:
+        """Factors of the stiffness and of the damping of contacts."""
+        return self.contact_stiffness, self.contact_damping
 
     @property
     def factors(self) -> FloatArray:
@@ -178,7 +178,7 @@ def model_with_parameters(
         damping=parameters.damping,
         motor_gains=np.array(parameters.motor_gains),
     )
-    scale_contacts(scaled, parameters.contact_stiffness, parameters.contact_damping)
+    scale_contacts(scaled, *parameters.contacts)
     of_joints: dict[int, float] = {}
     for motor, factor in enumerate(parameters.force_limits):
         scaled.actuator_forcerange[motor] *= factor
@@ -216,7 +216,7 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
     Contacts other than the robot's own are marked as fitted.
     """
     fitted = with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
-    if robot.has_fitted_contacts or not parameters.has_other_contacts:
+    if robot.has_fitted_contacts or parameters.contacts == (1.0, 1.0):
         return fitted
     spec = fitted.specification()
     spec.add_numeric(name=FITTED_CONTACTS, data=[1.0])
