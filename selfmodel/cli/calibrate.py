@@ -12,8 +12,8 @@ from selfmodel.cli.progress import display
 from selfmodel.cli.tables import show
 from selfmodel.errors import InputError, counted
 from selfmodel.logs.files import create_file
-from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
-from selfmodel.simulation.fit import NOMINAL
+from selfmodel.simulation.calibration import UNDETERMINED, calibrate as fit_to
+from selfmodel.simulation.fit import EXACT_ERROR, NOMINAL
 from selfmodel.simulation.model_factors import FACTORS
 from selfmodel.simulation.simulator import thread_count
 

@@ -28,7 +28,7 @@ from selfmodel.diagnosis.losses import (
     LossTable,
     Timeline,
 )
-from selfmodel.diagnosis.problem import Problem
+from selfmodel.diagnosis.problem import Problem, Refits
 from selfmodel.diagnosis.search import (
     LocalSearch,
     by_distance,
@@ -45,7 +45,6 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, suitable
 from selfmodel.progress import Progress
 from selfmodel.settings import EA, STEPWISE, Settings
-from selfmodel.simulation.calibration import Refit
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPart, trial_names
 
@@ -90,7 +89,7 @@ class DiagnosticSearch:
         kinds: Sequence[FaultKind] = PAPER_KINDS,
         *,
         healthy_trials: Sequence[Trial] = (),
-        refit: Refit | None = None,
+        refit: Refits | None = None,
     ) -> None:
         self._refit = refit
         self._settings = settings

@@ -17,9 +17,12 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import LOCKED_LEG, SERVO_GAIN, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
 from selfmodel.progress import Observer, ignore
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import Refit
 from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
+
+Refits = Callable[[Sequence[Trial], Sequence[Hypothesis]], Robot]
+"""Fits the self-model again, to trials and the faults of the robot in each."""
 
 MIN_SURROGATE_PIECES = 2
 """Pieces of the surrogate comparator that a search in a part of the trials needs."""
@@ -57,7 +60,7 @@ class Problem:
     healthy_trials: Sequence[TrialPart]
     names: Mapping[str, str]
     settings: Settings
-    refit: Refit | None = None
+    refit: Refits | None = None
     healthy_parts: Sequence[TrialPart] = ()
     observer: Observer = ignore
     standing: frozenset[str] = field(init=False)

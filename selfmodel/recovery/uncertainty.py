@@ -21,8 +21,9 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.rotation import directions, headings
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.domain import DomainDistribution, DomainSample, StartSpread, draw_samples
+from selfmodel.simulation.fit import EXACT_ERROR
 from selfmodel.simulation.model_factors import LogNormal, Weighted, exact
 from selfmodel.simulation.rollout import batch_bytes
 from selfmodel.simulation.simulator import Simulator

@@ -18,7 +18,7 @@ from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
 from selfmodel.simulation.fit import (
-    NOMINAL,
+    EXACT_ERROR,
     Fit,
     expected_models,
     is_determined,
@@ -36,10 +36,6 @@ from selfmodel.simulation.segments import (
     root_mean_square,
 )
 from selfmodel.trials.trial import Trial
-
-EXACT_ERROR = 0.01
-"""Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model counts as
-exact."""
 
 Known = dict[Hashable, ObservedSegments]
 """Segments of trials with the errors of their predictions, by the trial, time and faults."""
@@ -195,11 +191,9 @@ def calibrate(
             {},
             lambda done: observer(Progress(STAGE, min(done, most), most)),
         )
-        before = segments.of([nominal(robot)])[:, 0]
-        prior = model_factors.prior_deviations(robot)
-        first = Fit(NOMINAL, nominal(robot), prior, before, before)
-        is_exact = root_mean_square(before) < EXACT_ERROR
-        best = first if is_exact else nested_fits(segments, first)[-1]
+        first, *others = nested_fits(segments)
+        best, prior = others[-1] if others else first, first.deviations
+        is_exact = root_mean_square(first.errors) < EXACT_ERROR
         if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
@@ -217,7 +211,7 @@ def calibrate(
             robot=robot if best is first else model_factors.with_parameters(robot, parameters),
             parameters=parameters,
             deviations=deviations,
-            error_before=float(root_mean_square(before)),
+            error_before=float(root_mean_square(first.errors)),
             error=float(root_mean_square(best.errors)),
             joints=_joints(segments, first, best) if is_fixed else None,
             chosen=best.name,
@@ -233,7 +227,8 @@ def calibrate(
 class Refit:
     """Fits a self-model again, to trials of the healthy robot and others in which it has faults.
 
-    It starts from a calibration, whose delay stays; see ``fit.refitted``.
+    It starts from a calibration, and is taken as it is, without a held-out test: see
+    ``fit.refitted``.
 
     Attributes:
         robot: The nominal robot, as before the calibration.
@@ -255,7 +250,7 @@ class Refit:
         given = list(zip(trials, hypotheses, strict=True))
         with threadpool_limits(1, "blas"):  # as in ``calibrate``
             segments = _segment_errors(self.robot, given, self.threads, self._known)
-            found = refitted(segments, self.calibration.parameters, self.calibration.chosen)
+            found = refitted(segments, self.calibration.parameters)
         return model_factors.with_parameters(self.robot, found)
 
 

@@ -26,12 +26,23 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import (
     FORCE_LIMITS,
     JOINT_PRIOR_DEVIATIONS,
+    MAX_LOG_FACTOR,
     Basis,
     Parameters,
     bases,
+    nominal,
     prior_deviations,
 )
-from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
+from selfmodel.simulation.segments import (
+    SegmentErrors,
+    is_better,
+    pseudo_huber,
+    root_mean_square,
+)
+
+EXACT_ERROR = 0.01
+"""Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model counts as
+exact."""
 
 NOMINAL, DELAY, CONTACTS = "nominal", "delay", "contacts"
 """Names of the nested sets of parameters before those of factors."""
@@ -41,7 +52,7 @@ CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
 """Factors of the stiffness and the damping of contacts in the exhaustive search."""
 
 FRICTION_STEP = 0.9
-"""Factor from one friction to the next once contacts have changed: a step of a third of the prior's
+"""Factor from one friction to the next beside other contacts: a step of a third of the prior's
 deviation."""
 
 FOLDS = 4
@@ -82,7 +93,6 @@ class Method:
         is_central: Whether the solver's differences are central, with that step; otherwise they are
             forward, and the step is relative to the deviation of the prior.
         iterations: Largest number of iterations of the least-squares solver.
-        refit_iterations: As ``iterations``, of a fit that starts from that of other trials.
         delay_iterations: As ``iterations``, for each neighbouring delay; 0 to keep the delay.
         regularizers: Smallest and largest regularizer of the solver, and the factor from one to the
             next.
@@ -92,19 +102,22 @@ class Method:
     step: float
     is_central: bool
     iterations: int
-    refit_iterations: int
     delay_iterations: int
     regularizers: Mapping[str, float]
 
 
-FLOATING = Method(0.05, 0.1, True, 3, 1, 0, {})
+FLOATING = Method(0.05, 0.1, True, 3, 0, {})
 """Where there are contacts, smaller steps are dominated by noise: a parameter changes the time at
-which a foot makes contact. Of ten trials of ``benchmarks.foreign``, a refit of one iteration has a
-lower cost than a fit to all trials from the nominal model in eight, in a fourth of the time."""
+which a foot makes contact."""
 
-FIXED = Method(0.01, 0.05, False, 5, 5, 2, {"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0})
+FIXED = Method(0.01, 0.05, False, 5, 2, {"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0})
 """Long simulations without contacts have errors far below their unit, so their prior weighs less
 than that of short predictions."""
+
+
+REFIT_ITERATIONS = 1
+"""Iterations of a refit. Of ten trials of ``benchmarks.foreign``, its cost was lower than that of a
+fit to all trials from the nominal model in eight, in a fourth of the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,10 +145,17 @@ def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
     return np.asarray(deviation < UNDETERMINED_SHARE * prior)
 
 
-def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
-    """Returns the nominal set, then each nested set that was chosen; the last is the best."""
-    robot, best, chosen = segments.robot, first.parameters, [first]
-    contacts_min_z = CONTACTS_MIN_Z * float(np.sqrt(segments.overlap))
+def nested_fits(segments: SegmentErrors) -> list[Fit]:
+    """Returns the nominal set, then each nested set that was chosen; the last is the best.
+
+    The nominal set is the only one if it predicts the segments exactly.
+    """
+    robot, best = segments.robot, nominal(segments.robot)
+    errors = segments.of([best])[:, 0]
+    first = Fit(NOMINAL, best, prior_deviations(robot), errors, errors)
+    if root_mean_square(errors) < EXACT_ERROR:
+        return [first]
+    chosen, contacts_min_z = [first], CONTACTS_MIN_Z * float(np.sqrt(segments.overlap))
 
     def choose(fit: Fit, min_z: float) -> bool:
         losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
@@ -177,19 +197,17 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
     return chosen
 
 
-def refitted(segments: SegmentErrors, start: Parameters, name: str) -> Parameters:
-    """Returns a fit, fitted again to further trials: contacts near its own, then its factors.
+def refitted(segments: SegmentErrors, start: Parameters) -> Parameters:
+    """Returns a fit of other trials, fitted to the segments: contacts near its own, then factors.
 
-    Its delay stays, and the prior is that of the nominal model. A fit without factors gets those of
-    the smallest set.
+    Its delay stays, and the prior is that of the nominal model. A fixed base is fitted anew: which
+    limits and delays count depends on the movement, and its fit is cheap.
     """
-    robot = segments.robot
-    sets = dict(bases(robot, reaches_limits=bool(start.force_limits)))
-    basis = sets.get(name) or next(iter(sets.values()))
-    method = FIXED if robot.has_fixed_base else FLOATING
-    if not robot.has_fixed_base:
-        start, _ = _with_near_contacts(segments, start, segments.of([start])[:, 0])
-    return _Fitter(segments, basis, method).solved(start, method.refit_iterations)[0]
+    if segments.robot.has_fixed_base:
+        return nested_fits(segments)[-1].parameters
+    near, _ = _with_near_contacts(segments, start, segments.of([start])[:, 0])
+    ((_, basis),) = bases(segments.robot)
+    return _Fitter(segments, basis, FLOATING).solved(near, REFIT_ITERATIONS)[0]
 
 
 def expected_models(robot: Robot) -> int:
@@ -201,7 +219,7 @@ def expected_models(robot: Robot) -> int:
     else:
         method, tried = FLOATING, 0
         count += delays + 2 * (delay_parts(robot).bit_length() - 1)
-        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 9  # and neighbours
+        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 11  # and near
     for _, basis in bases(robot):
         width = len(basis.prior)
         slopes = 2 * width if method.is_central else width
@@ -270,8 +288,8 @@ def _with_near_contacts(
 ) -> tuple[Parameters, FloatArray]:
     """Returns a fit with the best contacts beside its own, then the best friction; its errors.
 
-    Contacts were searched with the nominal friction, and friction was fitted with these contacts;
-    each changes which of the other is best.
+    Contacts were searched with another friction, and friction was fitted with these contacts; each
+    changes which of the other is best.
     """
     stiffnesses, dampings = (
         every[max(every.index(own) - 1, 0) : every.index(own) + 2]
@@ -288,9 +306,12 @@ def _with_near_contacts(
     found = {start: errors, **dict(zip(near, segments.of(near).T, strict=True))}
     best = min(found, key=lambda own: _cost(found[own]))
     for factor in (FRICTION_STEP, 1 / FRICTION_STEP):
-        moved = replace(best, friction=best.friction * factor)
-        while _cost(found.setdefault(moved, segments.of([moved])[:, 0])) < _cost(found[best]):
-            best, moved = moved, replace(moved, friction=moved.friction * factor)
+        while abs(np.log(friction := best.friction * factor)) < MAX_LOG_FACTOR:
+            moved = replace(best, friction=friction)
+            found[moved] = segments.of([moved])[:, 0]
+            if not _cost(found[moved]) < _cost(found[best]):
+                break
+            best = moved
     return best, found[best]
 
 

@@ -214,7 +214,10 @@ def run_recovery(
     check_measurable(experiment.score, robot, observed_of(healthy, damaged))
     make_repair = plugins.repair(experiment.repair, experiment.search, experiment.repertoire)
     next_trial, kinds = plugins.next_trial(experiment.next_trial), experiment.kinds
-    calibrated, fit = experiment.calibrated, partial(fitted, robot, threads=threads)
+    calibrated, fit = (
+        experiment.calibrated,
+        partial(fitted, robot, threads=threads, observer=on_event),
+    )
     make_run(folder := experiment.folder, calibrated=calibrated)
     return RecoveryLoop(
         simulator=Simulator(robot, threads, stats),
@@ -228,7 +231,7 @@ def run_recovery(
         design=experiment.design,
         kinds=kinds,
         hypothesis=experiment.hypothesis,
-        calibrate=partial(fit, observer=on_event) if calibrated else None,
+        calibrate=fit if experiment.calibrated else None,
         next_trial=next_trial,
         score=experiment.score,
         make_repair=make_repair,

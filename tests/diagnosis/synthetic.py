@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 
 from selfmodel.diagnosis.losses import LossFunction, LossTable
-from selfmodel.diagnosis.problem import Problem
+from selfmodel.diagnosis.problem import Problem, Refits
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.progress import ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import Refit
 from selfmodel.trials.trial import Trial, TrialPart, trial_names, whole
 
 HingeLosses = Callable[[Sequence[Hypothesis]], np.ndarray]
@@ -26,7 +25,7 @@ def problem_of(
     healthy: Sequence[Trial | TrialPart],
     kinds: Sequence[FaultKind],
     *,
-    refit: Refit | None = None,
+    refit: Refits | None = None,
 ) -> Problem:
     """The problem of some trials of a robot."""
     return Problem(

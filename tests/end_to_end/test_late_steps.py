@@ -23,7 +23,8 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
+from selfmodel.simulation.calibration import prediction_error
+from selfmodel.simulation.fit import EXACT_ERROR
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture

@@ -409,12 +409,15 @@ def test_the_best_trial_is_one_without_a_fall_unless_the_robot_fell_in_all(
 @pytest.mark.search
 @pytest.mark.parametrize(("kind", "next_trial"), [("network", "separates"), ("cpg", "repair")])
 def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
-    quadruped: Robot, kind: str, next_trial: str
+    monkeypatch: pytest.MonkeyPatch, quadruped: Robot, kind: str, next_trial: str
 ):
     # Command ranges of more digits than a model is written with.
     ranges = "-0.7853981633974483 0.7853981633974483", "-0.71234567891 0.6543210987"
     robot = dataclasses.replace(quadruped, mjcf=quadruped.mjcf.replace(*ranges))
     fitted = with_parameters(robot, dataclasses.replace(nominal(robot), friction=1.1))
+
+    calibrated, refits = SimpleNamespace(robot=fitted, summary=None), []
+    monkeypatch.setattr("selfmodel.recovery.recover.Refit", lambda *given: refits.append(given))
 
     def separating(loop: RecoveryLoop) -> Controller:
         rest = loop.simulator, loop.settings, loop.rng
@@ -424,13 +427,14 @@ def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
         robot,
         settings=dataclasses.replace(TINY, trials=2),
         design=DESIGNS[kind](robot, None),
-        calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
+        calibrate=lambda _trials: calibrated,
         next_trial=by_repair if next_trial == "repair" else separating,
     )
     designs = {trial.plan.controller.design for trial in outcome.trials}
 
     assert designs == {DESIGNS[kind](robot, None)}
     assert designs != {DESIGNS[kind](with_parameters(robot, nominal(robot)), None)}
+    assert refits == [(robot, calibrated, 2)], "of the robot before its calibration"
 
 
 def trials_of(robot: Robot, count: int) -> list[Trial]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+import selfmodel
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -19,13 +20,17 @@ from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import calibration, fit, segments
 from selfmodel.simulation.calibration import (
-    EXACT_ERROR,
     Calibration,
     Refit,
     calibrate,
     prediction_error,
 )
-from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
+from selfmodel.simulation.fit import (
+    EXACT_ERROR,
+    UNDETERMINED_SHARE,
+    consistent_information,
+    is_determined,
+)
 from selfmodel.simulation.model_factors import (
     FACTORS,
     MAX_LOG_FACTOR,
@@ -49,6 +54,7 @@ from tests.helpers.robots.arms import robot_of as arm_of
 search = pytest.mark.search
 
 STEPS = 200
+SMALL = selfmodel.Settings(steps=STEPS, generations=2).scaled(4)
 LOGS_OF_0_1 = Path(__file__).parents[1] / "data" / "logs-0.1"
 QUADRUPED = ROBOTS["quadruped"].robot()
 TRUE = Parameters(1.25, 0.9, 0.8, 1.3, (1.2, 1.0, 0.85, 1.0, 1.0, 0.8, 1.0, 1.15), delay=2)
@@ -111,12 +117,40 @@ def test_a_refit_follows_further_trials_from_the_fit_with_its_delay():
     worn = with_parameters(QUADRUPED, dataclasses.replace(TRUE, friction=1.2))
     further = moving_trial(worn, SimulatedRobot(worn), 3)
     refit = Refit(QUADRUPED, fitted(), 1)([further], [INTACT])
-    frictions = [robot.model.geom_friction[0, 0] for robot in (worn, refit, fitted().robot)]
     before, after = (prediction_error(robot, [further], 1) for robot in (fitted().robot, refit))
 
     assert after < 0.5 * before
-    assert abs(frictions[1] - frictions[0]) < 0.5 * abs(frictions[2] - frictions[0])
     assert refit.control_delay == fitted().parameters.delay
+
+
+@search
+def test_friction_and_contacts_are_found_together():
+    slippery = dataclasses.replace(TRUE, friction=0.4, contact_stiffness=2.0)
+    found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, slippery)), 1).parameters
+
+    assert found.contact_stiffness == 2.0
+    assert 0.4 < found.friction < 0.55
+
+
+def test_no_friction_is_beyond_the_bounds():
+    falling = Mock(of=lambda models: np.array([[one.friction for one in models]]))
+    near, _ = fit._with_near_contacts(falling, nominal(QUADRUPED), np.ones(1))
+
+    assert near.friction == pytest.approx(np.exp(-MAX_LOG_FACTOR), rel=0.1)
+
+
+@search
+def test_a_diagnosis_refits_the_robot_as_it_was_before_the_calibration(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    made = list[tuple[Robot, Calibration, int]]()
+    monkeypatch.setattr(calibration, "Refit", lambda *given: made.append(given))
+    healthy, damaged = trials(real(), 2)
+    selfmodel.diagnose(damaged, healthy=healthy, robot=QUADRUPED, settings=SMALL, threads=1)
+    ((robot, fit, _),) = made
+
+    assert robot is QUADRUPED
+    assert fit.robot.mjcf != QUADRUPED.mjcf
 
 
 @search
@@ -370,11 +404,11 @@ def arm() -> Robot:
     return arm_of(ARM, control_timestep=0.01)
 
 
-def arm_trial(physical: Robot, noise: float) -> Trial:
+def arm_trial(physical: Robot, noise: float, amplitude: float = 1.0) -> Trial:
     """A trial with joint positions and commands only."""
     rng, time = np.random.default_rng(1), np.arange(ARM_STEPS) * 0.01
     phase = 2 * np.pi * np.stack([time * (0.4 + 0.1 * time), time * (0.9 - 0.1 * time)], axis=1)
-    commands = 0.7 * np.sin(phase) + 0.3 * np.sign(np.sin(2.7 * phase))
+    commands = amplitude * (0.7 * np.sin(phase) + 0.3 * np.sign(np.sin(2.7 * phase)))
     driver = played_back(physical.anatomy.motors, commands)
     whole = collect(physical.anatomy.names, SimulatedRobot(physical).run(driver, ARM_STEPS))
     signals = {name: np.full_like(values, np.nan) for name, values in whole.signals.items()}
@@ -410,13 +444,26 @@ def test_a_limit_of_the_force_is_fitted_if_the_trials_reach_it(limit: float, fou
     nominal_arm = arm_of(ARM.replace("-20 20", f"-{limit} {limit}"), control_timestep=0.01)
     limits = (0.5, 0.5) if found else ()
     true = Parameters(**JOINTS_TRUE, force_limits=limits, delay=ARM_DELAY)
-    calibration = calibrate(
-        nominal_arm, [arm_trial(with_parameters(nominal_arm, true), ARM_NOISE)], 1
-    )
+    trial = arm_trial(with_parameters(nominal_arm, true), ARM_NOISE)
+    calibration = calibrate(nominal_arm, [trial], 1)
 
     assert calibration.parameters.force_limits == pytest.approx(limits, rel=0.1)
     rows = [row for row in calibration.joints["parameters"] if row["quantity"] == "force limit"]
     assert [row["name"] for row in rows] == (["a", "b"] if found else [])
+
+
+@search
+def test_a_refit_of_an_arm_finds_a_limit_that_the_healthy_trials_do_not_reach():
+    nominal_arm = arm_of(ARM.replace("-20 20", "-8 8"), control_timestep=0.01)
+    true = Parameters(**JOINTS_TRUE, force_limits=(0.5, 0.5), delay=ARM_DELAY)
+    limited = with_parameters(nominal_arm, true)
+    small, large = (arm_trial(limited, ARM_NOISE, amplitude) for amplitude in (0.1, 1.0))
+    fit = calibrate(nominal_arm, [small], 1)
+    refit = Refit(nominal_arm, fit, 1)([small, large], [INTACT, INTACT])
+    before, after = (prediction_error(robot, [large], 1) for robot in (fit.robot, refit))
+
+    assert fit.parameters.force_limits == ()
+    assert after < 0.1 * before
 
 
 @search
