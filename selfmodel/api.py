@@ -441,7 +441,7 @@ def diagnosis_of_logs(
         settings,
         kinds,
         healthy_trials=healthy,
-        refit=calibration.Refit(robot, fit, count) if fit else None,
+        refit=calibration.Refit(robot, fit, count, on_event) if fit else None,
     )
     drawn = damaged[0].plan.seed if seed is None else seed
     found = recovery_loop.diagnose_trials(damaged, search, drawn, on_event, hypothesis=hypothesis)

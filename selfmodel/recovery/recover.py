@@ -149,7 +149,9 @@ class RecoveryLoop:
         search = DiagnosticSearch(
             *(self.simulator, comparator.comparator, self.settings, self.kinds),
             healthy_trials=self.trials[:1],
-            refit=Refit(robot, calibration, self.simulator.threads) if calibration else None,
+            refit=Refit(robot, calibration, self.simulator.threads, self.on_event)
+            if calibration
+            else None,
         )
         for left in range(self.settings.trials, 0, -1):
             self.trials_left = left

@@ -21,6 +21,7 @@ from selfmodel.simulation.fit import (
     EXACT_ERROR,
     Fit,
     expected_models,
+    expected_refit_models,
     is_determined,
     nested_fits,
     refitted,
@@ -234,11 +235,13 @@ class Refit:
         robot: The nominal robot, as before the calibration.
         calibration: Its fit to the healthy trials.
         threads: Threads of the simulations.
+        observer: Called with the progress of each fit.
     """
 
     robot: Robot
     calibration: Calibration
     threads: int
+    observer: Observer = ignore
     _known: Known = field(default_factory=dict, init=False)
 
     def __call__(self, trials: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> Robot:
@@ -247,10 +250,15 @@ class Refit:
         Raises:
             InputError: Too little of a trial was observed.
         """
-        given = list(zip(trials, hypotheses, strict=True))
+        given, most = list(zip(trials, hypotheses, strict=True)), expected_refit_models(self.robot)
+
+        def on_models(done: int) -> None:
+            self.observer(Progress(STAGE, min(done, most), most))
+
         with threadpool_limits(1, "blas"):  # as in ``calibrate``
-            segments = _segment_errors(self.robot, given, self.threads, self._known)
+            segments = _segment_errors(self.robot, given, self.threads, self._known, on_models)
             found = refitted(segments, self.calibration.parameters)
+        on_models(most)
         return model_factors.with_parameters(self.robot, found)
 
 

@@ -229,6 +229,14 @@ def expected_models(robot: Robot) -> int:
     return count
 
 
+def expected_refit_models(robot: Robot) -> int:
+    """Returns about how many models a refit simulates, for its progress."""
+    if robot.has_fixed_base:
+        return expected_models(robot)
+    ((_, basis),) = bases(robot)
+    return 11 + REFIT_ITERATIONS * (2 * len(basis.prior) + 2)  # near contacts, frictions
+
+
 def delay_parts(robot: Robot) -> int:
     """Returns the parts of a control step of which a delay is a multiple."""
     return 1 if robot.model.na else robot.substeps

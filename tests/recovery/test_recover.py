@@ -434,7 +434,8 @@ def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
 
     assert designs == {DESIGNS[kind](robot, None)}
     assert designs != {DESIGNS[kind](with_parameters(robot, nominal(robot)), None)}
-    assert refits == [(robot, calibrated, 2)], "of the robot before its calibration"
+    ((*given, _),) = refits
+    assert given == [robot, calibrated, 2], "of the robot before its calibration"
 
 
 def trials_of(robot: Robot, count: int) -> list[Trial]:

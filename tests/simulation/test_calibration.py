@@ -17,6 +17,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
+from selfmodel.progress import Progress
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import calibration, fit, segments
 from selfmodel.simulation.calibration import (
@@ -116,11 +117,12 @@ def test_the_faults_of_the_robot_in_a_trial_are_no_parameters_of_its_model():
 def test_a_refit_follows_further_trials_from_the_fit_with_its_delay():
     worn = with_parameters(QUADRUPED, dataclasses.replace(TRUE, friction=1.2))
     further = moving_trial(worn, SimulatedRobot(worn), 3)
-    refit = Refit(QUADRUPED, fitted(), 1)([further], [INTACT])
+    refit = Refit(QUADRUPED, fitted(), 1, (shown := list[Progress]()).append)([further], [INTACT])
     before, after = (prediction_error(robot, [further], 1) for robot in (fitted().robot, refit))
 
     assert after < 0.5 * before
     assert refit.control_delay == fitted().parameters.delay
+    assert shown[0].done < shown[0].total / 2 < shown[-2].done <= shown[-1].done == shown[-1].total
 
 
 @search
@@ -135,7 +137,6 @@ def test_friction_and_contacts_are_found_together():
 def test_no_friction_is_beyond_the_bounds():
     falling = Mock(of=lambda models: np.array([[one.friction for one in models]]))
     near, _ = fit._with_near_contacts(falling, nominal(QUADRUPED), np.ones(1))
-
     assert near.friction == pytest.approx(np.exp(-MAX_LOG_FACTOR), rel=0.1)
 
 
@@ -143,12 +144,11 @@ def test_no_friction_is_beyond_the_bounds():
 def test_a_diagnosis_refits_the_robot_as_it_was_before_the_calibration(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    made = list[tuple[Robot, Calibration, int]]()
+    made = list[tuple[object, ...]]()
     monkeypatch.setattr(calibration, "Refit", lambda *given: made.append(given))
     healthy, damaged = trials(real(), 2)
     selfmodel.diagnose(damaged, healthy=healthy, robot=QUADRUPED, settings=SMALL, threads=1)
-    ((robot, fit, _),) = made
-
+    ((robot, fit, *_),) = made
     assert robot is QUADRUPED
     assert fit.robot.mjcf != QUADRUPED.mjcf
 
