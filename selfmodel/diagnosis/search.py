@@ -32,6 +32,7 @@ one (a tenth from three trials on), or the first third of each trial. No ablatio
 ``SHORTLIST_SIZE`` is on record.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import combinations
@@ -67,6 +68,9 @@ ZOOM_POINTS, ZOOMS, MAX_ROUNDS = 7, 2, 2
 
 SEVERITY_DECIMALS = 4
 """Decimals of a fitted severity."""
+
+ONE_ERROR = math.exp(-1 / 2)
+"""Weight of a severity whose loss is a standard error above the best."""
 
 
 def evolved(
@@ -394,7 +398,9 @@ def with_mean_severities(
     With one seed and a true friction of 0.4, hardly any friction from 0.31 to 0.41 was a standard
     error worse than another, 0.31 had the lowest loss, and the mean is 0.36. A severity whose loss
     is z standard errors above the best, paired over the pieces, has the weight exp(-z^2 / 2).
-    Severities beyond a ruled-out severity have no weight.
+    Severities beyond a ruled-out severity have no weight. Of a severity below the lowest level but
+    0, that level stands, as of a motor without torque, unless the best is a standard error better:
+    every mean is above it, and a leg with a hundredth of a servo's gain is not limp.
     """
     current = hypothesis
     for index in range(len(hypothesis)):
@@ -417,6 +423,10 @@ def _averaged(
         return hypothesis
     rows = losses([space.with_severity(hypothesis, index, severity) for severity in severities])
     weights = _weights(rows)
+    proposed = space.levels(fault)
+    is_least = 0.0 in proposed and fault.severity < min(filter(None, proposed))
+    if is_least and weights[severities.index(0.0)] > ONE_ERROR:
+        return space.with_severity(hypothesis, index, 0.0)
     # Integrals, because severities are denser around the best.
     mean = np.trapezoid(weights * severities, severities) / np.trapezoid(weights, severities)
     return space.with_severity(hypothesis, index, round(float(mean), SEVERITY_DECIMALS))

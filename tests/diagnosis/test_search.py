@@ -447,6 +447,27 @@ def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is()
     assert LocalSearch(Synthetic(winds, losses, most=1)).refined([wind]) == wind
 
 
+@pytest.mark.parametrize(
+    ("best", "errors", "is_dead"),
+    [(0.02, 0.9, True), (0.02, 1.1, False), (0.09, 0.9, True), (0.3, 0.9, False)],
+)
+def test_a_motor_below_its_levels_is_dead_unless_torque_is_a_standard_error_better(
+    best: float, errors: float, *, is_dead: bool
+):
+    ripple = np.random.default_rng(0).normal(size=PIECES)
+    ripple -= ripple.mean()
+    without = errors * ripple.std(ddof=1) / np.sqrt(PIECES) + ripple
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        left = np.array([[degree_of(one)] for one in hypotheses])
+        return 5 + np.where(left == 0, without, np.abs(left - best) * (1 + 30 * ripple))
+
+    fitted = parse(f"motor:front_left_knee={best}", ANATOMY)
+    found = with_mean_severities(fitted, losses, space_of(WEAK_MOTOR))
+
+    assert is_dead == (degree_of(found) == 0)
+
+
 def test_a_mean_is_not_taken_across_what_predicts_worse():
     valleys = of_friction(lambda one: 2 + min(abs(one - 0.2), abs(one - 1.2)), noise=0.2)
     mean = with_mean_severities(friction(0.2), valleys, SPACE)
