@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.recovery.falls import fall_of
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.rotation import directions, headings
@@ -237,16 +239,17 @@ class Posterior:
         """Returns an uncertainty whose models are weighted by their predictions of trials.
 
         Trials of the stage ``before`` are of the healthy robot, and all others of one with the
-        faults of the hypothesis. Trials whose base was not observed are left out.
+        faults of the hypothesis. Trials whose base was not observed are left out, and so is the
+        time after a fall, which is chance.
         """
         sample = [condition.model for condition in self._conditions[: self._models]]
         if not any(model.differs for model in sample):
             return self._uncertainty
         likelihood = np.zeros(self._models)
         for trial in trials:
-            track = _observed(trial)
-            if np.isfinite(track).all():
-                faults = INTACT if trial.plan.stage == "before" else hypothesis
+            faults = INTACT if trial.plan.stage == "before" else hypothesis
+            track = _observed(trial)[: fall_of(self.simulator.robot, faults, trial)]
+            if len(track) and np.isfinite(track).all():
                 likelihood += self._likelihood(trial, track, faults)
         models = Weighted(sample, flattened_weights(likelihood))
         return dataclasses.replace(self._uncertainty, models=models)
@@ -257,7 +260,8 @@ class Posterior:
             conditions = [
                 dataclasses.replace(each, hypothesis=hypothesis) for each in self._conditions
             ]
-            paths = _paths(self.simulator, self._uncertainty, trial, conditions)
+            controller, steps = trial.plan.controller, len(track)
+            paths = _paths(self.simulator, self._uncertainty, controller, steps, conditions)
             # Relative to the first step, a value has the noise of two measurements.
             measured = np.sqrt(2) * np.repeat(encoder_noise(track), MARKS)
             self._likelihoods[key] = log_likelihood(
@@ -304,10 +308,11 @@ def flattened_weights(likelihood: FloatArray) -> FloatArray:
 def _paths(
     simulator: Simulator,
     uncertainty: DomainDistribution,
-    trial: Trial,
+    controller: CommandSource,
+    steps: int,
     conditions: Sequence[DomainSample],
 ) -> FloatArray:
-    """Returns the path of a trial's controller under each condition, ``(conditions, values)``.
+    """Returns the path of a controller under each condition, ``(conditions, values)``.
 
     The path of a simulation that diverged is NaN. The models of a batch take bounded memory.
     """
@@ -318,8 +323,8 @@ def _paths(
         outcome = simulator.run_under(
             conditions[first : first + size],
             uncertainty,
-            [trial.plan.controller],
-            trial.trajectory.steps,
+            [controller],
+            steps,
             ("base_position", "base_orientation"),
         )
         simulated = outcome.trajectory

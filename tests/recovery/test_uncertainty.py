@@ -209,3 +209,27 @@ def test_the_healthy_trial_is_simulated_without_the_fault(
 
     np.testing.assert_array_equal(weights, own.after([walked], INTACT).models.weights)
     assert not np.array_equal(weights, damaged)
+
+
+def test_what_a_robot_does_after_a_fall_is_no_evidence_on_its_model(
+    healthy: list[Trial], calibration: Calibration
+):
+    def fallen(slide: float, fall: int) -> Trial:
+        position = walked.trajectory["base_position"].copy()
+        position[fall:] = [slide, -slide, 0.0]
+        signals = {**walked.trajectory.signals, "base_position": position}
+        trajectory = dataclasses.replace(walked.trajectory, signals=signals)
+        return dataclasses.replace(walked, trajectory=trajectory, path=f"{slide}, {fall}")
+
+    walked = healthy[0]
+    own = posterior(calibration, [walked])
+    before = own.simulator.stats.steps
+    near, far, later, lying = (
+        own.after([fallen(*one)], INTACT).models.weights
+        for one in ((0.0, 100), (3.0, 100), (3.0, 150), (0.0, 0))
+    )
+
+    np.testing.assert_array_equal(near, far)
+    assert not np.array_equal(near, later)
+    np.testing.assert_allclose(lying, 1 / len(lying))
+    assert own.simulator.stats.steps - before < 3 * 200 * (12 + 16 + 1)
