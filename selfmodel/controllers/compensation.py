@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller, ControllerBatch, Design
 from selfmodel.controllers.policy import PolicyBatch
 from selfmodel.rotation import directions
@@ -238,3 +238,7 @@ class CompensatedBatch:
             change += np.einsum("nmk,nk->nm", layer.response, felt)
         targets += np.where(change == 0, -0.0, change)
         np.clip(targets, self._low, self._high, out=targets)
+
+    def end(self, running: IndexArray) -> None:
+        """Notes which robots are still stepped; see ``ControllerBatch``."""
+        self._within.end(running)

@@ -16,7 +16,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, frozen
+from selfmodel.arrays import FloatArray, IndexArray, frozen
 from selfmodel.controllers.playback import Playback, PlaybackBatch
 from selfmodel.errors import InputError, check_type, typed
 from selfmodel.rotation import headings
@@ -55,6 +55,9 @@ class ControllerBatch(Protocol):
 
     def step(self, targets: FloatArray) -> None:
         """Writes the commands of the next control step, ``(n, motors)``, given ``readings``."""
+
+    def end(self, running: IndexArray) -> None:
+        """Notes which robots are still stepped; the commands of the others matter no longer."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import (
     HOLDS,
     CommandScaler,
@@ -169,3 +169,6 @@ class CpgBatch:
         self._phase += self._stride * speed
         self._phase -= np.floor(self._phase)
         self._step += 1
+
+    def end(self, _running: IndexArray) -> None:
+        """Changes nothing: the commands of a robot cost little."""

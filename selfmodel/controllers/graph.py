@@ -44,6 +44,11 @@ class Node:
     outputs: tuple[str, ...]
     attributes: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
 
+    @cached_property
+    def keywords(self) -> Mapping[str, Any]:
+        """Its attributes by name, and the number of its outputs, as ``OPERATORS`` receive them."""
+        return {**dict(self.attributes), "num_outputs": len(self.outputs)}
+
 
 @dataclass(frozen=True)
 class State:
@@ -164,11 +169,11 @@ class Graph:
         for node in self.nodes:
             arguments: list[Any] = [values[name] if name else None for name in node.inputs]
             try:
-                results = _results(node, arguments, left)
+                results, size = _results(node, arguments, left)
             except _FAILURES as error:
                 shapes = ", ".join(str(np.shape(one)) for one in arguments)
                 raise ValueError(f"{node.operator} of the shapes {shapes}: {error}") from error
-            left -= sum(map(np.size, results))
+            left -= size
             values.update(zip(node.outputs, results, strict=False))
         return values[self.output], tuple(values[state.output] for state in self.states)
 
@@ -219,15 +224,15 @@ _FAILURES = (
 )
 
 
-def _results(node: Node, arguments: Arguments, left: int) -> Sequence[FloatArray]:
-    attributes = {**dict(node.attributes), "num_outputs": len(node.outputs)}
+def _results(node: Node, arguments: Arguments, left: int) -> tuple[Sequence[FloatArray], int]:
+    """Returns the outputs of a node, and how many numbers they have together."""
     # Before any is computed: two small values may make a large one.
-    sizes = [np.shape(one) for one in arguments if one is not None]
-    if node.operator not in BY_SHAPE and math.prod(np.broadcast_shapes(*sizes)) > left:
+    shapes = {np.shape(one) for one in arguments if one is not None}
+    if node.operator not in BY_SHAPE and math.prod(np.broadcast_shapes(*shapes)) > left:
         raise ValueError(f"more than {MAX_NUMBERS} numbers in a row")
-    results = OPERATORS[node.operator](arguments, attributes)
+    results = OPERATORS[node.operator](arguments, node.keywords)
     if len(results) < len(node.outputs):
         raise ValueError(f"{len(results)} outputs, expected {len(node.outputs)}")
-    if sum(map(np.size, results)) > left:
+    if (size := sum(map(np.size, results))) > left:
         raise ValueError(f"more than {MAX_NUMBERS} numbers in a row")
-    return results
+    return results, size

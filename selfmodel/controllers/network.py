@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import (
     HOLDS,
     CommandScaler,
@@ -114,3 +114,6 @@ class NetworkBatch:
         self._heading.scale(motors)
         np.clip(motors, -1, 1, out=motors)
         self._scaler.write(motors, targets)
+
+    def end(self, _running: IndexArray) -> None:
+        """Changes nothing: the commands of a robot cost little."""

@@ -38,11 +38,17 @@ def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
         of_row = "ni,nji->nj" if is_own else "ni,ji->nj"
         return np.asarray(np.einsum(of_row, np.ascontiguousarray(rows), matrix))
     # The own matrix of a row multiplies a block of it and zeros, as one for all does.
-    blocks = np.zeros((len(rows) if is_own else -(-len(rows) // BLOCK), BLOCK, width))
-    (blocks[:, 0] if is_own else blocks.reshape(-1, width))[: len(rows)] = rows
+    count = len(rows) if is_own else -(-len(rows) // BLOCK)
+    if is_own or len(rows) < count * BLOCK:
+        blocks = np.zeros((count, BLOCK, width))
+        (blocks[:, 0] if is_own else blocks.reshape(-1, width))[: len(rows)] = rows
+    else:
+        blocks = np.ascontiguousarray(rows).reshape(count, BLOCK, width)
     turned, most = np.swapaxes(matrix, -1, -2), max(1, MAX_PRODUCTS // (BLOCK * width))
-    parts = [blocks @ turned[..., first : first + most] for first in range(0, outputs, most)]
-    whole = np.concatenate(parts, axis=2)
+    whole = np.empty((count, BLOCK, outputs))
+    for first in range(0, outputs, most):
+        part = slice(first, first + most)
+        np.matmul(blocks, turned[..., part], out=whole[..., part])
     return whole[:, 0] if is_own else whole.reshape(-1, outputs)[: len(rows)]
 
 
@@ -51,8 +57,12 @@ def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
     if attributes.get("transA"):
         raise ValueError("a transposed first factor is not supported")
     turned = matrix if attributes.get("transB") else np.ascontiguousarray(matrix.T)
-    result = attributes.get("alpha", 1.0) * _matmul(rows, turned)
-    return [result + attributes.get("beta", 1.0) * bias[0] if bias else result]
+    result = _scaled(_matmul(rows, turned), attributes.get("alpha", 1.0))
+    return [result + _scaled(bias[0], attributes.get("beta", 1.0)) if bias else result]
+
+
+def _scaled(values: FloatArray, factor: float) -> FloatArray:
+    return values if factor == 1 else factor * values
 
 
 def _product(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, frozen, held
+from selfmodel.arrays import FloatArray, IndexArray, frozen, held
 from selfmodel.errors import typed
 
 
@@ -83,3 +83,6 @@ class PlaybackBatch:
         for target, commands in zip(targets, self._commands, strict=True):
             target[:] = commands[min(self._step, len(commands) - 1)]
         self._step += 1
+
+    def end(self, _running: IndexArray) -> None:
+        """Changes nothing."""

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import TASK_PREFIX, Design
 from selfmodel.controllers.function import Function
 from selfmodel.controllers.graph import Graph
@@ -301,6 +301,7 @@ class PolicyBatch:
         self._output = np.zeros((count, policy.graph.outputs))
         self._states = policy.graph.initial(count)
         self._tensors = tensors or {}
+        self._running = np.arange(count)
         self._history: list[list[FloatArray]] = []
         self._step = 0
 
@@ -309,13 +310,23 @@ class PolicyBatch:
         own = self._interface
         if self._step % own.decimation == 0:
             self.input = self.observation()
-            output, self._states = self._graph.step(self.input, self._states, self._tensors)
+            rows = self.input[self._running]
+            output, self._states = self._graph.step(rows, self._states, self._tensors)
             most = math.inf if own.action.clip is None else own.action.clip
-            self._output = np.clip(output, -most, most)
+            self._output[self._running] = np.clip(output, -most, most)
         targets[:] = own.holding
         targets[:, self._motors] = self._offset + self._scale * self._output
         np.clip(targets, self._low, self._high, out=targets)
         self._step += 1
+
+    def end(self, running: IndexArray) -> None:
+        """Evaluates the network for some robots only, from now on; see ``ControllerBatch``."""
+        if len(running) == len(self._running):
+            return
+        kept = np.searchsorted(self._running, running)
+        self._states = tuple(state[:, kept] for state in self._states)
+        self._tensors = {name: rows[kept] for name, rows in self._tensors.items()}
+        self._running = running
 
     def observation(self) -> FloatArray:
         """Returns the input of the network, ``(n, inputs)``, of what is observed now."""

@@ -286,7 +286,9 @@ class Rollout:
         The state of a rollout that has ended does not change.
         """
         self._batch.end(ended)
-        return len(self._batch.running)
+        running = self._batch.running
+        self._controllers.end(running)
+        return len(running)
 
     def diverged(self) -> BoolArray:
         """Returns a mask of the rollouts that have diverged or had a MuJoCo warning, ``(n,)``."""

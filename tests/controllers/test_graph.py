@@ -147,17 +147,36 @@ MIXED = Graph(
         "w": random_layers(78, 12)[0][0],
     },
 )
+EVERY_OTHER = Graph(
+    *("x", "y", 1024, 129),
+    (
+        Node("Slice", ("x", "begin", "end", "axis", "step"), ("other",)),
+        Node("Gemm", ("other", "w"), ("y",), (("transB", 1.0),)),
+    ),
+    {
+        "begin": np.array([0]),
+        "end": np.array([1024]),
+        "axis": np.array([1]),
+        "step": np.array([2]),
+        "w": random_layers(512, 129)[0][0],
+    },
+)
 NETWORKS = [
     random_network(48, 64, 32, 12, activation="Elu"),
     random_network(48, 520, 100, 12, activation="Elu"),  # by BLAS, the second layer in two parts
     random_network(1, 3, 1),
     MIXED,
+    EVERY_OTHER,
 ]
 
 
-@pytest.mark.parametrize("network", NETWORKS, ids=["layers", "large", "narrow", "mixed"])
+@pytest.mark.parametrize("network", NETWORKS, ids=["layers", "large", "narrow", "mixed", "strided"])
 @settings(max_examples=25)
-@given(rows=st.integers(1, 130), place=st.integers(0, 129), seed=st.integers(0, 99))
+@given(
+    rows=st.integers(1, 130) | st.sampled_from([8, 16]),
+    place=st.integers(0, 129),
+    seed=st.integers(0, 99),
+)
 def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(
     network: Graph, rows: int, place: int, seed: int
 ):

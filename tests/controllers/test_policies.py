@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from selfmodel.controllers.compensation import Compensated
+from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.graph import Graph, Node, State
 from selfmodel.controllers.policy import Policy, PolicyBatch, Term
 from tests.helpers.policies import (
     INTERFACE,
@@ -19,6 +22,10 @@ from tests.helpers.policies import (
     policy,
     random_network,
 )
+
+
+def compensated(own: Policy) -> Compensated:
+    return Compensated.around(Controller(own, np.empty(0)))
 
 
 def seen(own: Policy, steps: int, sense: Callable[[PolicyBatch, int], None] = feel) -> list:
@@ -104,6 +111,41 @@ def test_a_decimated_network_is_evaluated_every_so_many_steps_and_its_command_is
 
     assert seen(own, 7) == seen(policy("phase", "sensors"), 7)[::3]
     assert [k for k in range(1, 7) if (commands[k] != commands[k - 1]).any()] == [3, 6]
+
+
+def accumulating() -> Graph:
+    """A network whose output is the sum of a layer over all evaluations."""
+    matrix = np.random.default_rng(2).normal(size=(2, 10))
+    nodes = (
+        Node("Gemm", ("x", "w"), ("a",), (("transB", 1.0),)),
+        Node("Unsqueeze", ("a", "zero"), ("u",)),
+        Node("Add", ("h", "u"), ("h1",)),
+        Node("Squeeze", ("h1", "zero"), ("y",)),
+    )
+    return Graph("x", "y", 10, 2, nodes, {"w": matrix, "zero": np.zeros(1)}, (State("h", "h1", 2),))
+
+
+@pytest.mark.parametrize("around", [lambda one: one, compensated], ids=["policy", "layer"])
+@pytest.mark.parametrize(
+    "network", [random_network(10, 8, 2), accumulating()], ids=["plain", "rnn"]
+)
+def test_robots_that_have_ended_change_no_bit_of_those_that_go_on(
+    network: Graph, around: Callable[[Policy], Design]
+):
+    own = around(policy(graph=network))
+    ends = {2: [0, 2, 3, 4], 4: [2, 4], 5: [4]}
+    whole, ended = (own.batch(np.zeros((5, own.weights)), [frozenset()] * 5) for _ in range(2))
+    going = list(range(5))
+    for k in range(8):
+        going = ends.get(k, going)
+        if k in ends:
+            ended.end(np.array(going))
+        commands = np.empty((2, 5, len(MOTORS)))
+        for batch, targets in zip((whole, ended), commands, strict=True):
+            feel(batch, k)
+            batch.step(targets)
+        np.testing.assert_array_equal(commands[0, going], commands[1, going])
+        assert (commands[0] == commands[1]).all() == (k < 2)
 
 
 def test_commands_are_offset_and_scale_of_a_clipped_output_and_other_motors_hold():

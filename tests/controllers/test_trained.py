@@ -73,6 +73,19 @@ def test_each_row_has_the_commands_of_its_own_policy_to_the_bit(design: Evolved)
 
 
 @EVERY_DESIGN
+def test_the_weights_of_a_row_stay_its_own_when_others_have_ended(design: Evolved):
+    genomes = np.random.default_rng(1).uniform(-1, 1, (5, design.weights))
+    batch = design.batch(genomes, [frozenset()] * 5)
+    for k, expected in enumerate(commands(design, genomes)):
+        if k == 2:
+            batch.end(np.array([1, 4]))
+        targets = np.empty_like(expected)
+        feel(batch, k, slice(None), 5)
+        batch.step(targets)
+        np.testing.assert_array_equal(targets[[1, 4]], expected[[1, 4]])
+
+
+@EVERY_DESIGN
 def test_a_genome_of_zeros_changes_no_bit(design: Evolved):
     plain = commands(design.policy(np.zeros(design.weights)), np.empty((1, 0)), slice(1))
     own = commands(design, np.zeros((1, design.weights)), slice(1))
