@@ -305,7 +305,8 @@ def recover(
             displacement until the first fall, or the whole displacement for the paper's repair.
         repair: ``robust``, on rollouts under random conditions; ``paper``, in one exact
             simulation; ``compensate``, of a layer around ``gait``, the default with one; or
-            ``finetune``, of the last layer of the network of ``gait``.
+            ``finetune``, of the last layer of the network of ``gait``. The last two end with the
+            first trial in which the robot walks as before.
         search: ``cma-es``, ``ea``, ``repertoire`` or a function that makes one; by default that of
             the repair, CMA-ES or the paper's EA, or the repertoire if one is given.
         repertoire: Gaits from which the search begins, or the path of their file.

@@ -47,7 +47,8 @@ class Settings:
 
     Attributes:
         steps: Control steps of a run.
-        trials: Physical trials after the failing one.
+        trials: Physical trials after the failing one, at most: a recovery that adapts a robot's
+            controller ends with the first one in which the robot walks as before.
         population: Genomes in a generation.
         generations: Generations of an EA, the random first one included.
         survivors: Number of the best genomes that survive a generation.

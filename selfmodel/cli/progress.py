@@ -20,6 +20,7 @@ from selfmodel.recovery.falls import fall_of, fall_text
 from selfmodel.recovery.result import (
     DiscriminatingTrial,
     Event,
+    Restored,
     SearchBegins,
     SelfModelWarning,
     TrialScore,
@@ -87,7 +88,7 @@ class _Events(Display):
                     self.print_lines(f"{self._search}: {event}")
             case Progress():
                 self._stage(event)
-            case ChosenComparator() | DiscriminatingTrial() | SelfModelWarning():
+            case ChosenComparator() | DiscriminatingTrial() | Restored() | SelfModelWarning():
                 self.print_lines(str(event))
             case Calibration():
                 self.print_lines(*_fit_lines(event))

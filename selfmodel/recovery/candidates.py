@@ -5,8 +5,9 @@ of the model and indistinguishable hypotheses. The last candidates have to keep 
 quarter of the physics time step: a search finds what a coarse one flatters.
 """
 
+import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -27,7 +28,7 @@ VIABLE = 0.5
 FINER, LOSS = 4, 0.2
 """Physics steps in place of each under which the last candidates are simulated again, and the share
 of its score that one of them may lose by that. The conditions are the first quarter of the last
-ones, so that the physics steps are as many as those of the last comparison."""
+ones, so that one candidate takes as many physics steps as in the last comparison."""
 
 TAIL = 0.25
 """Fraction of the conditions, those with the lowest scores, that count as the lower tail."""
@@ -122,7 +123,7 @@ def unflattered(repair: Evolves, search: Callable[[], tuple[Candidates, Candidat
     """Returns the candidates of a search that keep their scores at a quarter of the time step.
 
     If none does, the repair has that time step from now on, and the search is repeated. The search
-    returns all candidates, and those of them that keep their scores.
+    returns all candidates, and what ``converged`` keeps of them.
     """
     found, kept = search()
     if not kept and repair.parts == 1:
@@ -132,20 +133,40 @@ def unflattered(repair: Evolves, search: Callable[[], tuple[Candidates, Candidat
 
 
 def converged(
-    candidates: Candidates, fitness: RobustFitness, steps: int, rng: np.random.Generator
+    candidates: Candidates,
+    fitness: RobustFitness,
+    steps: int,
+    rng: np.random.Generator,
+    known: Collection[Controller] = (),
 ) -> Candidates:
     """Returns the candidates that keep their scores at a quarter of the physics time step.
 
-    What a stiff servo or a massless rotor does at a coarse time step is no motion of a robot. The
-    fitness is what scored the candidates, best first, and the generator in the state in which their
-    conditions were drawn.
+    They are those up to the first that is not known, which is the next trial. A candidate is left
+    out if it loses more than ``LOSS`` of its mean score, by a standard error over the conditions,
+    or if a further rollout diverges. What a stiff servo or a massless rotor does at a coarse time
+    step is no motion of a robot, and costs all rollouts their scores; a fall in one of four is
+    chance. The fitness is what scored the candidates, best first, and the generator in the state in
+    which their conditions were drawn.
     """
     finer = replace(fitness, simulator=fitness.simulator.finer(FINER))
-    conditions = max(1, len(candidates[0].scores) // FINER)
-    before = robust(np.array([each.scores[:conditions] for each in candidates]))
-    after = robust(finer([each.controller for each in candidates], conditions, steps, rng))
-    keep = before - after <= LOSS * abs(before)
-    return tuple(candidates[i] for i in np.flatnonzero(keep).tolist())
+    conditions, kept = max(1, len(candidates[0].scores) // FINER), list[CandidateController]()
+    for one in candidates:
+        (fine,) = finer([one.controller], conditions, steps, copy.deepcopy(rng))
+        if _keeps(one.scores[:conditions], fine):
+            kept.append(one)
+            if one.controller not in known:
+                break
+    return tuple(kept)
+
+
+def _keeps(coarse: FloatArray, fine: FloatArray) -> bool:
+    known = np.isfinite(coarse)
+    before, after = coarse[known], fine[known]
+    if not len(before) or not np.isfinite(after).all():
+        return False
+    lost = before - after
+    error = lost.std(ddof=1) / math.sqrt(len(lost)) if len(lost) > 1 else 0.0
+    return bool(lost.mean() - error <= LOSS * abs(before.mean()))
 
 
 def robust(scores: FloatArray) -> FloatArray:

@@ -45,8 +45,8 @@ def by_disagreement(loop: RecoveryLoop) -> Controller:
 
     A repair is returned once the diagnosis is ``explained`` or ``intact`` and either has no
     undetectable fault or has the same undetectable faults as the diagnosis before, which the last
-    trial did not resolve. The last trial is always a repair: only a repair that is tried restores
-    the robot.
+    trial did not resolve. The last of all trials is always a repair: only a repair that is tried
+    restores the robot.
     """
     *earlier, diagnosis = loop.diagnoses
     unresolved = bool(earlier) and earlier[-1].undetectable == diagnosis.undetectable

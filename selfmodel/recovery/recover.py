@@ -27,6 +27,7 @@ from selfmodel.recovery.falls import fall_of
 from selfmodel.recovery.result import (
     Event,
     Recovery,
+    Restored,
     SearchBegins,
     SelfModelWarning,
     TrialScore,
@@ -43,6 +44,10 @@ from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
+SHORT_OF_BEFORE = 0.1
+"""Share of the score before the failure that a robot with a controller of its own may lack in a
+recovery trial that is the last one: each trial is a risk."""
+
 RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 """Runs a physical trial and returns it; with a log, as read back from the log."""
 
@@ -52,7 +57,7 @@ def by_repair(loop: "RecoveryLoop") -> Controller:
 
     A repair around the controller of the robot leaves that of an intact robot as it is.
     """
-    if loop.gait and loop.keeps_intact and loop.diagnoses[-1].verdict == "intact":
+    if loop.gait and loop.adapts_gait and loop.diagnoses[-1].verdict == "intact":
         return loop.gait
     candidates, tried = [each.controller for each in loop.repaired()], loop.controllers
     return next((one for one in candidates if one not in tried), candidates[0])
@@ -70,6 +75,8 @@ class RecoveryLoop:
             the algorithm observes of the robot.
         store_diagnosis: Stores a diagnosis after the earlier ones; ``run_trial`` stores the trials.
         settings: The paper's numbers.
+        ends_early: Whether a recovery ends with the first trial in which a robot that has a
+            controller of its own walks as before.
         repair_settings: Those of the repair, in runs of the same length; None for the same.
         seed: Seed of all random choices.
         on_event: Callback, called with each event as it happens.
@@ -104,6 +111,7 @@ class RecoveryLoop:
     score: Score = UPRIGHT
     make_repair: repairs.MakeRepair = repairs.RobustRepair
     repair_settings: RepairSettings | None = None
+    ends_early: bool = True
     trials: tuple[Trial, ...] = field(default=(), init=False)
     diagnoses: tuple[Diagnosis, ...] = field(default=(), init=False)
     trials_left: int = field(default=0, init=False)
@@ -122,7 +130,8 @@ class RecoveryLoop:
         is fitted to the log. It fails, and the same gait is logged again. Both logs choose the
         comparator. Then diagnosis and trial alternate: the diagnosis explains all logs since the
         failure, and the next trial tries a controller that the repair evolved in simulation for
-        the diagnosed robot (``repaired``). The last diagnosis is of all trials.
+        the diagnosed robot (``repaired``), until there were as many as the settings allow, or a
+        robot with a controller of its own walks as before. The last diagnosis is of all trials.
         """
         robot = self.simulator.robot
         HypothesisSpace.of(self.kinds, robot.anatomy)  # refused before any trial
@@ -153,24 +162,37 @@ class RecoveryLoop:
             if calibration
             else None,
         )
+        self._diagnose(search)
         for left in range(self.settings.trials, 0, -1):
             self.trials_left = left
-            self._diagnose(search)
             controller = self.next_trial(self)  # by default ``by_repair``: the best of ``repaired``
             self._log_trial(damaged, "recovery", controller)
-        self._diagnose(search)
+            self._diagnose(search)
+            if left > 1 and self._is_restored:
+                self.on_event(Restored())
+                break
         return self._result(comparator, calibration, search)
 
     def repaired(self) -> Candidates:
-        """Evolves controllers that compensate for the last diagnosis; returns them best first."""
+        """Evolves controllers that compensate for the last diagnosis; returns them best first.
+
+        They are those up to the first that was not tried before.
+        """
         diagnosis = self.diagnoses[-1]
         uncertainty = partial(self._posterior.after, self.trials, diagnosis.best)
         return self._evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
 
     @property
-    def keeps_intact(self) -> bool:
-        """Whether a robot that is found intact keeps its controller."""
-        return self._repairs[-1].keeps_intact
+    def adapts_gait(self) -> bool:
+        """Whether the repair changes the controller of the robot; see ``Repair``."""
+        return self._repairs[-1].adapts_gait
+
+    @property
+    def _is_restored(self) -> bool:
+        """Whether the robot walked as before in the last trial, by an adapted controller."""
+        before, last = self._scored[0].value, self._scored[-1]
+        is_as_before = last.fall is None and before - last.value <= SHORT_OF_BEFORE * abs(before)
+        return self.ends_early and self.adapts_gait and is_as_before
 
     def _make_repair(self) -> None:
         """Makes the repair of the self-model."""

@@ -82,11 +82,13 @@ class Repair(Protocol):
 
     Attributes:
         evaluations: Number of controllers evaluated so far.
-        keeps_intact: Whether a robot that is found intact keeps its controller.
+        adapts_gait: Whether it changes the controller of the robot, and evolves no other: a robot
+            that is found intact keeps its controller, and one that walks as before needs no
+            further trial.
     """
 
     evaluations: int
-    keeps_intact: ClassVar[bool]
+    adapts_gait: ClassVar[bool]
 
     def __call__(
         self,
@@ -135,7 +137,7 @@ class RepairSearch:
     settings: Settings
     design: Design | None = None
     score: Score = DISPLACEMENT
-    keeps_intact: ClassVar[bool] = False
+    adapts_gait: ClassVar[bool] = False
     evaluations: int = field(default=0, init=False)
     _known: dict[Run, FloatArray] = field(default_factory=dict, init=False)
 
@@ -185,7 +187,7 @@ class RobustRepair:
     design: Design
     score: Score = UPRIGHT
     make_search: MakeSearch = CmaEs
-    keeps_intact: ClassVar[bool] = False
+    adapts_gait: ClassVar[bool] = False
     evaluations: int = field(default=0, init=False)
     parts: int = field(default=1, init=False)
 

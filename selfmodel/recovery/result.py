@@ -46,6 +46,14 @@ class DiscriminatingTrial:
 
 
 @dataclass(frozen=True)
+class Restored:
+    """End of a recovery before all of its trials, which a robot that walks as before needs not."""
+
+    def __str__(self) -> str:
+        return "the robot walks as before the failure: no further trial"
+
+
+@dataclass(frozen=True)
 class TrialScore:
     """Score of a trial by the best hypothesis so far; an event again if a diagnosis changes it.
 
@@ -90,6 +98,7 @@ Event = (
     | ChosenComparator
     | Calibration
     | DiscriminatingTrial
+    | Restored
     | Trial
     | TrialScore
     | SelfModelWarning
@@ -97,8 +106,8 @@ Event = (
 )
 """What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
 a search, the progress of another stage, the chosen comparator, the calibration, a finished trial,
-its score, a warning about the self-model, a diagnosis. ``print`` shows each as text, those of a
-stage with the time left."""
+its score, a warning about the self-model, a diagnosis, an end before all trials. ``print`` shows
+each as text, those of a stage with the time left."""
 
 
 @dataclass(frozen=True)

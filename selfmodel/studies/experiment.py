@@ -102,6 +102,7 @@ class Experiment:
     search: MakeSearch | str | None = None
     repertoire: Repertoire | None = None
     repair_settings: RepairSettings | None = None
+    ends_early: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,6 +237,7 @@ def run_recovery(
         score=experiment.score,
         make_repair=make_repair,
         repair_settings=experiment.repair_settings,
+        ends_early=experiment.ends_early,
     ).run(healthy, damaged)
 
 

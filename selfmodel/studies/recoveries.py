@@ -328,6 +328,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         repair=shared["repair"],
         search=shared["search"],
         repair_settings=of_repair,
+        ends_early=False,  # its rows are compared with those of other methods after each trial
     )
     watch = _DiagnosisWatch()
     outcome = experiments.run(experiment, watch)

@@ -175,7 +175,7 @@ def test_an_intact_robot_keeps_its_controller_with_a_repair_around_it(
     for verdict in ("intact", "unexplained"):
         found = diagnosis("intact", robot=quadruped, verdict=verdict)
         loop = loop_of(quadruped, [gait], [better], [found])
-        loop.gait, loop._repairs = gait, [Mock(keeps_intact=keeps)]
+        loop.gait, loop._repairs = gait, [Mock(adapts_gait=keeps)]
         assert by_repair(loop) == (gait if keeps and verdict == "intact" else better)
 
 

@@ -278,7 +278,7 @@ def test_a_comparator_that_refuses_the_healthy_trial_ends_the_recovery_before_th
 class StubRepair:
     """A repair that returns the same candidates every time, and notes what it received."""
 
-    evaluations = 7
+    evaluations, adapts_gait = 7, False
     scores = np.array([-9.0, -7.0])
 
     def __init__(self, candidates: Sequence[Controller]) -> None:
