@@ -417,14 +417,13 @@ def _averaged(
     bounds = space.severity_bounds(fault)
     if bounds is None or fault.kind.edits_specification:
         return hypothesis
-    levels = [fault.severity, *space.levels(fault)]
-    severities = sorted({*levels, *_around(fault.severity, levels, bounds)})
+    levels = space.levels(fault)
+    severities = sorted({fault.severity, *levels, *_around(fault.severity, levels, bounds)})
     if len(severities) == 1:
         return hypothesis
     rows = losses([space.with_severity(hypothesis, index, severity) for severity in severities])
     weights = _weights(rows)
-    proposed = space.levels(fault)
-    is_least = 0.0 in proposed and fault.severity < min(filter(None, proposed))
+    is_least = 0.0 in levels and fault.severity < min(filter(None, levels), default=0.0)
     if is_least and weights[severities.index(0.0)] > ONE_ERROR:
         return space.with_severity(hypothesis, index, 0.0)
     # Integrals, because severities are denser around the best.

@@ -5,7 +5,7 @@ squared difference from the effects of the truth, so the truth has a loss of 0.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -459,13 +459,15 @@ def test_a_motor_below_its_levels_is_dead_unless_torque_is_a_standard_error_bett
     without = errors * ripple.std(ddof=1) / np.sqrt(PIECES) + ripple
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-        left = np.array([[degree_of(one)] for one in hypotheses])
+        left = np.array([[sum(of.severity for of in one.faults) or not one] for one in hypotheses])
         return 5 + np.where(left == 0, without, np.abs(left - best) * (1 + 30 * ripple))
 
     fitted = parse(f"motor:front_left_knee={best}", ANATOMY)
     found = with_mean_severities(fitted, losses, space_of(WEAK_MOTOR))
 
     assert is_dead == (degree_of(found) == 0)
+    alone = Hypothesis((replace(fitted.faults[0], kind=replace(WEAK_MOTOR, levels=(0.0,))),))
+    assert degree_of(with_mean_severities(alone, losses, space_of(WEAK_MOTOR))) > 0
 
 
 def test_a_mean_is_not_taken_across_what_predicts_worse():
