@@ -71,6 +71,9 @@ LONGER = (
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
+UNTIL_IT_FALLS = "record this robot again, so that it moves for longer, and diagnose the new log"
+"""What decides on a doubt about a robot that soon lies or stands."""
+
 LEFT_OUT = ". Or import again without the fast part (with {}), and repeat the diagnosis"
 """What decides too, if the healthy trials cover all but a few parts of the imported ones."""
 

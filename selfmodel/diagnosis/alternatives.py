@@ -1,10 +1,11 @@
 """Alternatives to the best hypothesis: indistinguishable, undetectable and unsearched faults.
 
-They come from the neighbourhood of the best hypothesis, whatever the search compared.
+They come from the neighbourhood of the best hypothesis, whatever the search compared; those that
+were passed over are the search's.
 """
 
 import math
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,11 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.progress import Observer, followed, ignore
+
+UNTOLD = 0.5
+"""Share of the loss of an intact robot with which a fault is not passed over: where a robot lies
+from the first second on, few pieces tell. Of 315 healthy recordings that were found intact, the
+best of all hypotheses had 0.60 to 1; a dead motor that was missed, 0.39."""
 
 
 def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
@@ -74,6 +80,24 @@ def indistinguishable(leads: Mapping[Hypothesis, float]) -> list[Hypothesis]:
     Of those that differ in severities alone, there is the one with the smallest loss.
     """
     return best_severities(one for one, lead in leads.items() if lead < significance.MIN_Z)
+
+
+def passed_over(compared: Sequence[Hypothesis], problem: Problem) -> Hypothesis | None:
+    """Returns the fewest faults that halve the loss of an intact robot without a significant lead.
+
+    None if there are none, if the loss is as good as 0, or if healthy trials gain from them too.
+    They are of the hypotheses that a search compared, those with the smallest distances first.
+    """
+    intact, *rows = problem.losses([INTACT, *compared])
+    untold = [
+        one
+        for one, row in zip(compared, rows, strict=True)
+        if intact.mean() > significance.LOSS_FLOOR
+        and row.mean() <= UNTOLD * intact.mean()
+        and not significance.is_better(row, intact)
+        and ((healthy := problem.healthy([one, INTACT])) is None or np.diff(healthy.mean(1)) <= 0)
+    ]
+    return min(untold, key=len, default=None)
 
 
 def _with_fitted_others(one: Hypothesis, best: Hypothesis, problem: Problem) -> Hypothesis:

@@ -25,7 +25,7 @@ healthy robot, or significantly worse than with a fault of an unsearched kind, s
 missing; requires a trial of the healthy robot. A diagnosis is also ``unexplained`` if the
 simulation of every hypothesis diverged. ``not judged``: a fault or an error of the self-model
 explains the trials, and neither the healthy trials nor the comparator decide between them; see
-``adequacy``."""
+``adequacy``. Or a fault explains most of the loss of an intact robot, and few pieces tell."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ SURE = 0.8
 
 UNKNOWN = "look over the whole robot: no kind of fault that can be simulated explains its logs"
 
+MEND = "mend it, or evolve a controller for the robot as it is (selfmodel.evolve)"
+
 EARLIER = "check the earlier fault, which may come back"
 
 NO_DOUBT = Doubt("the diagnosis does not say why", "record a healthy robot moving like this one")
@@ -63,8 +65,13 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         case "explained":
             is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
             robot = "nothing is wrong with the robot itself: " if is_outside else ""
-            each = "whether this is so. If not" if len(best) == 1 else "each. If one is not so"
-            return [robot + best.words + sure], f"check {each}, {again}"
+            mend = "nothing is to be done" if is_outside else MEND
+            is_so, is_not = (
+                ("whether this is so. If it is", "If not")
+                if len(best) == 1
+                else ("each. If all are so", "If one is not")
+            )
+            return [robot + best.words + sure], f"check {is_so}, {mend}. {is_not}, {again}"
         case "ambiguous":
             facts, checks = _alternatives(diagnosis)
             failed = "none of these is" if len(checks) > 1 else "it is not"

@@ -5,7 +5,7 @@ carry it, and a search of which every simulation diverged is ``unexplained``.
 
 It does not depend on the random numbers of the search: alternatives to the best hypothesis come
 from its neighbourhood, whatever the search compared. (The best hypothesis, of which a refit may
-leave faults out, and the rest of the ranking are the search's.)
+leave faults out, the rest of the ranking, and a fault that was passed over are the search's.)
 
 Probabilities are from the statistics that decide the verdict. A hypothesis over which the best one
 leads by ``z`` standard errors (``leads_of``) has the weight ``exp(-z^2 / 2)``, the best has 1.
@@ -23,6 +23,7 @@ import numpy as np
 
 from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.adequacy import (
+    UNTIL_IT_FALLS,
     contradiction,
     doubt_of,
     fit_of,
@@ -36,12 +37,14 @@ from selfmodel.diagnosis.alternatives import (
     detectable_severities,
     indistinguishable,
     leads_of,
+    passed_over,
     undetectable,
     unsearched_fault,
 )
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
     Diagnosis,
+    Doubt,
     Fit,
     Residual,
     UnsearchedFault,
@@ -118,6 +121,10 @@ def diagnosis_of(
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
     doubt = unreproduced(fit, by_refit) or contradiction(found, problem)
+    if doubt is None and verdict == "intact" and not found:
+        fault = passed_over(ranked, problem)
+        if fault is not None:
+            doubt, alike = _untold(fault, problem), [fault]
     if doubt is None and verdict != "intact":
         doubt = doubt_of(accused, fit, by_refit)
     probability: dict[str, float] = {}
@@ -169,6 +176,19 @@ def probabilities(
     share = UNKNOWN + (0.0 if misses else (1 - 2 * UNKNOWN) / (1 + odds))
     total = sum(weights.values())
     return {str(one): share * weight / total for one, weight in weights.items()}
+
+
+def _untold(fault: Hypothesis, problem: Problem) -> Doubt:
+    """Returns the doubt about a robot without a fault, most of whose loss a fault explains."""
+    intact, other = problem.losses([INTACT, fault])
+    return Doubt(
+        f"{fault} leaves {other.mean() / intact.mean():.0%} of the loss without a fault, and leads "
+        f"by {significance.lead(other, intact):.1f} standard errors, where {significance.MIN_Z:g} "
+        f"are needed: few pieces of the trials tell",
+        f"check whether {fault.words}. If it is, mend it. If not, {UNTIL_IT_FALLS}",
+        f"it is not known whether something is wrong: perhaps {fault.words}, but too little of "
+        f"these logs shows it",
+    )
 
 
 def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:

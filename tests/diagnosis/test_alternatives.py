@@ -12,6 +12,7 @@ from selfmodel.diagnosis.alternatives import (
     detectable_severities,
     indistinguishable,
     leads_of,
+    passed_over,
     undetectable,
     unsearched_fault,
 )
@@ -118,6 +119,40 @@ def test_an_alternative_that_corrects_model_error_or_misses_a_joint_is_none():
         return rows * np.linspace(0.9, 1.1, PIECES)[:, np.newaxis]
 
     assert indistinguishable(leads_of(best, Synthetic(space, after, hinges=hinges))) == []
+
+
+def in_few_pieces(share: float, scale: float = 1.0, few: int = 4) -> LossFunction:
+    """Losses of which a fault leaves a share, in few pieces; beside another one, a tenth less."""
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        rows = np.full((len(hypotheses), PIECES), 0.0)
+        rows[:, :few] = PIECES / few * np.linspace(0.5, 1.5, few)
+        left = [
+            share - 0.1 * (len(one) - 1) if said(BREAK).faults[0] in one.faults else 1.0
+            for one in hypotheses
+        ]
+        return scale * rows * np.array(left)[:, np.newaxis]
+
+    return losses
+
+
+@pytest.mark.parametrize(
+    ("losses", "before", "found"),
+    [
+        (in_few_pieces(0.49), None, BREAK),
+        (in_few_pieces(0.55), None, f"{BREAK}+{TOUCH}"),
+        (in_few_pieces(0.61), None, None),
+        (in_few_pieces(0.49, few=40), None, None),  # a significant lead is the search's
+        (in_few_pieces(0.49, scale=0.009), None, None),
+        (in_few_pieces(0.49), in_few_pieces(0.49), None),  # healthy trials gain as much
+    ],
+)
+def test_a_fault_that_halves_the_loss_is_passed_over_only_for_the_pieces_that_tell(
+    losses: LossFunction, before: LossFunction | None, found: str | None
+):
+    compared = [INTACT, *map(said, [f"{BREAK}+{TOUCH}", TOUCH, BREAK])]
+
+    assert passed_over(compared, Synthetic(PAPER, losses, before=before)) == (found and said(found))
 
 
 def test_a_fault_that_makes_no_difference_is_undetectable_and_one_that_makes_one_is_not():

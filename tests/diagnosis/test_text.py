@@ -187,6 +187,7 @@ JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
 UNEXPLAINED = "Probably something is wrong that is not among the faults that were tried"
 NOTHING = "Nothing is wrong that is large enough to show in these logs"
+MEND = "mend it, or evolve a controller for the robot as it is (selfmodel.evolve)"
 AGAIN = (
     "record this robot again, with the same movements for twice as long, and diagnose the new log."
 )
@@ -229,7 +230,7 @@ def test_a_fault_before_a_change_is_not_forgotten():
                 "The joint front_left_knee is stuck (93 % sure: about 7 of 100 such answers are "
                 "wrong). This began about 4.9 s into the log '02-recovery'."
             ),
-            f"check whether this is so. If not, {AGAIN}",
+            f"check whether this is so. If it is, {MEND}. If not, {AGAIN}",
         ),
         (
             {"fit": None},
@@ -237,7 +238,7 @@ def test_a_fault_before_a_change_is_not_forgotten():
                 "The joint front_left_knee is stuck (a log of the healthy robot is needed to say "
                 "how sure this is)."
             ),
-            f"check whether this is so. If not, {HEALTHY_LOG}",
+            f"check whether this is so. If it is, {MEND}. If not, {HEALTHY_LOG}",
         ),
         (
             {"best": parse("slope=-0.081+wind=-22.27", ANATOMY)},
@@ -246,7 +247,7 @@ def test_a_fault_before_a_change_is_not_forgotten():
                 "slope of 4.6 degrees (0.081 rad), and a wind of 22 m/s blows from the front, as "
                 "seen at the start (it is not known how sure this is)."
             ),
-            f"check each. If one is not so, {AGAIN}",
+            f"check each. If all are so, nothing is to be done. If one is not, {AGAIN}",
         ),
         (
             {"best": parse("slope=-0.1+jam:front_left_knee", ANATOMY)},
@@ -254,7 +255,7 @@ def test_a_fault_before_a_change_is_not_forgotten():
                 "The joint front_left_knee is stuck, and the robot starts facing downhill, on a "
                 "slope of 5.7 degrees (0.1 rad) (it is not known how sure this is)."
             ),
-            f"check each. If one is not so, {AGAIN}",
+            f"check each. If all are so, {MEND}. If one is not, {AGAIN}",
         ),
         (
             {

@@ -397,6 +397,25 @@ def test_each_hypothesis_that_is_said_to_be_alike_has_a_probability(
     assert diagnosis_of(alone, [best], best).probability == {}, "nothing tells what is right"
 
 
+@pytest.mark.parametrize(("truth", "verdict"), [("intact", "not judged"), (LAME, "unexplained")])
+def test_a_fault_that_few_pieces_show_takes_the_place_of_intact_and_of_nothing_else(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch, truth: str, verdict: str
+):
+    fault = parse(LAME, quadruped.anatomy)
+    monkeypatch.setattr("selfmodel.diagnosis.verdict.passed_over", lambda *_: fault)
+    problem = with_healthy(quadruped, logged(quadruped, truth, "monday.mcap"))
+    found = diagnosis_of(problem, [INTACT, fault], INTACT)
+
+    assert found.verdict == verdict
+    if truth == "intact":
+        assert found.indistinguishable == (fault,)
+        assert found.probability == {}
+        what, action = summary(found)
+        assert f"perhaps {fault.words}" in what
+        assert f"check whether {fault.words}" in action
+        assert LAME in verdict_sentences(found)
+
+
 def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
     quadruped: Robot, monkeypatch: pytest.MonkeyPatch
 ):
