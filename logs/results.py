@@ -304,7 +304,7 @@ def result_bytes(content: Mapping[str, Any]) -> bytes:
 @cache
 def versions() -> Mapping[str, str]:
     """Returns the installed version of each package that determines the bits of a result."""
-    return {package: version(package) for package in ("selfmodel", "mujoco", "numpy")}
+    return {package: version(package) for package in ("selfmodel", "mujoco", "numpy", "cma")}
 
 
 def read_result(path: Path, what: str, remedy: str) -> Mapping[str, Any]:

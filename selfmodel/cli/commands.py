@@ -153,6 +153,7 @@ class Recover(Robot, Searched):
     generations: int = Settings.generations
     repair_population: int | None = None
     repair_generations: int | None = None
+    cache: bool = True
     out: Path | None = None
     threads: int = 0
     report: bool = False

@@ -22,7 +22,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
-from selfmodel.recovery.candidates import Candidates
+from selfmodel.recovery.candidates import CandidateController, Candidates
 from selfmodel.recovery.falls import fall_of
 from selfmodel.recovery.result import (
     Event,
@@ -50,6 +50,15 @@ recovery trial that is the last one: each trial is a risk."""
 
 RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 """Runs a physical trial and returns it; with a log, as read back from the log."""
+
+
+FirstGait = Callable[[Callable[[], CandidateController]], CandidateController]
+"""Returns the first gait of a robot, from a function that evolves it."""
+
+
+def evolved(evolve: Callable[[], CandidateController]) -> CandidateController:
+    """Returns the gait that is evolved now; a ``FirstGait``."""
+    return evolve()
 
 
 def by_repair(loop: "RecoveryLoop") -> Controller:
@@ -82,6 +91,7 @@ class RecoveryLoop:
         on_event: Callback, called with each event as it happens.
         gait: Controller of the robot before the failure; evolved if not given. The rest of the
             recovery does not depend on whether the same gait is evolved or given.
+        first_gait: Returns that gait, evolved before or now; by default now.
         design: Design of the controllers to evolve; the paper's network if not given.
         kinds: Fault kinds that a diagnosis searches.
         hypothesis: Hypothesis that the first diagnosis begins from; ``INTACT`` if none is known.
@@ -103,6 +113,7 @@ class RecoveryLoop:
     seed: int
     on_event: Callable[[Event], None]
     gait: Controller | None = None
+    first_gait: FirstGait = evolved
     design: Design | None = None
     kinds: Sequence[FaultKind] = DEFAULT_KINDS
     hypothesis: Hypothesis = INTACT
@@ -148,8 +159,7 @@ class RecoveryLoop:
         self._robust_means: list[float] = []
         self._scored: tuple[TrialScore, ...] = ()
         self._warnings: list[str] = []
-        assumed = partial(assumed_uncertainty, robot)
-        gait = self.gait or self._evolved((INTACT,), assumed)[0].controller
+        gait = self.gait or self._first_gait()
         self._log_trial(healthy, "before", gait)
         calibration = self._fit_self_model()
         self._log_trial(damaged, "after", gait)
@@ -172,6 +182,13 @@ class RecoveryLoop:
                 self.on_event(Restored())
                 break
         return self._result(comparator, calibration, search)
+
+    def _first_gait(self) -> Controller:
+        """Returns the gait of the robot before the failure, evolved now or before."""
+        assumed = partial(assumed_uncertainty, self.simulator.robot)
+        first = self.first_gait(lambda: self._evolved((INTACT,), assumed)[0])
+        self._means[first.controller] = first.mean
+        return first.controller
 
     def repaired(self) -> Candidates:
         """Evolves controllers that compensate for the last diagnosis; returns them best first.

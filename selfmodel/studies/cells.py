@@ -95,10 +95,10 @@ class Cell:
     def made_with(self) -> dict[str, str]:
         """Returns what determines the bits of the cell here, besides its definition.
 
-        It is the versions of selfmodel, MuJoCo and numpy, the digest of all modules and models of
-        selfmodel as ``code``, and the digest of each file of other code; see ``sources_of``.
+        It is the versions of selfmodel, MuJoCo, numpy and cma, the digest of all modules and models
+        of selfmodel as ``code``, and the digest of each file of other code; see ``sources_of``.
         """
-        from selfmodel.studies.sources import sources_of  # noqa: PLC0415  # a recovery has no cells
+        from selfmodel.studies.sources import sources_of  # noqa: PLC0415  # few recoveries name one
 
         return {**package_versions(), **sources_of(self.every_module)}
 

@@ -30,7 +30,13 @@ from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.recovery.recover import NextTrial, RecoveryLoop, random_stream
+from selfmodel.recovery.recover import (
+    FirstGait,
+    NextTrial,
+    RecoveryLoop,
+    evolved,
+    random_stream,
+)
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.repertoire import Repertoire, self_model_digest
 from selfmodel.recovery.result import Event, Recovery
@@ -92,6 +98,7 @@ class Experiment:
     gap: float = 0.0
     entry: Entry | None = None
     gait: Controller | None = None
+    first_gait: FirstGait = evolved
     kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     hypothesis: Hypothesis = INTACT
     calibrated: bool = True
@@ -229,6 +236,7 @@ def run_recovery(
         seed=experiment.seed,
         on_event=on_event,
         gait=experiment.gait,
+        first_gait=experiment.first_gait,
         design=experiment.design,
         kinds=kinds,
         hypothesis=experiment.hypothesis,

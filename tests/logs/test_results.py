@@ -36,7 +36,7 @@ def test_a_result_file_states_the_versions_that_made_it():
     values = json.loads(result_bytes({"a": 1}))
 
     assert list(values) == ["a", "made_with", "sha256"]
-    assert list(values["made_with"]) == ["selfmodel", "mujoco", "numpy"]
+    assert list(values["made_with"]) == ["selfmodel", "mujoco", "numpy", "cma"]
     assert values["made_with"] == versions()
     assert verified(values) == {"a": 1}
 
