@@ -51,6 +51,7 @@ class GrowingFile:
             end = self._file.tell() + int.from_bytes(head[1:], "little")
             if len(head) < _HEAD or end > size:
                 self._file.seek(begin)
+                self._check_not_replaced()
                 return
             data = head + self._file.read(end - self._file.tell())
             if head[0] not in _KINDS:
@@ -61,3 +62,18 @@ class GrowingFile:
                 yield breakup_chunk(record, validate_crc=True)
             else:
                 yield [record]
+
+    def _check_not_replaced(self) -> None:
+        """Checks that no other file has the name of one that is read no further.
+
+        A file that was moved, as a log is when it is finished, leaves its name free.
+        """
+        try:
+            is_same = os.path.samestat(self.path.stat(), os.fstat(self._file.fileno()))
+        except FileNotFoundError:
+            return
+        if not is_same:
+            raise InputError(
+                f"{self.path}: it is another file than before, so its recorder began anew under "
+                f"the same name: start the watch again"
+            )

@@ -413,6 +413,24 @@ def test_a_file_that_its_recorder_began_anew_is_refused(
         grown.look()
 
 
+@pytest.mark.parametrize("is_replaced", [True, False])
+def test_another_file_of_the_same_name_is_refused_and_one_that_was_moved_is_read_on(
+    tmp_path: Path, grow: Callable[..., Growth], *, is_replaced: bool
+):
+    write_mcap(tmp_path / "finished.mcap", recorded(), use_chunking=False)
+    grown, data = grow(), (tmp_path / "finished.mcap").read_bytes()
+    grown.append(data[:-9000], repeat(10**6))
+    moved = grown.path.rename(tmp_path / "moved.mcap")
+    if is_replaced:
+        grown.path.write_bytes(data)  # longer than what was read
+        with pytest.raises(InputError, match=r"grown\.mcap: .* another file .* start the watch"):
+            grown.look()
+    else:
+        with moved.open("ab") as file:
+            file.write(data[-9000:])
+        assert grown.look() > 0
+
+
 def test_other_formats_and_the_mapping_of_a_table_are_refused_with_what_to_do(
     tmp_path: Path, grow: Callable[..., Growth]
 ):
