@@ -1,6 +1,6 @@
 """Falls of a robot: the first step at which its base lies or is turned over, and stays so."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -10,7 +10,8 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
 from selfmodel.rotation import directions
-from selfmodel.simulation.simulator import Until
+from selfmodel.simulation.simulator import UNTIL_EVERY, Until
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
@@ -47,16 +48,25 @@ def fallen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> Until | None:
     """Returns the function that tells which runs have fallen, whatever follows; None if none can.
 
     The window of a fall is over: the rest of the run does not change the step of the fall. A run
-    that diverges after it is finite if it ends.
+    that diverges after it is finite if it ends. Falls that an earlier call has told are told again
+    only where the base stays as it is, as that of a run that has ended.
     """
     if not _has_gravity(robot):
         return None
     known = {hypothesis: build(robot, hypothesis).normal for hypothesis in {*hypotheses}}
     normals = np.array([known[hypothesis] for hypothesis in hypotheses])
 
-    def have_fallen(begun: Trajectory) -> BoolArray:
-        falls = first_falls(begun, normals, robot.standing_height)
-        return np.asarray(falls + steps_in(FALLEN_TIME, begun) <= begun.steps)
+    window = steps_of(FALLEN_TIME, robot.control_timestep)
+
+    def have_fallen(begun: Mapping[Signal, FloatArray]) -> BoolArray:
+        position, orientation = begun["base_position"], begun["base_orientation"]
+        run = position.shape[-2]
+        # In the first step the robot stands, in the initial orientation; the others are all that
+        # the last call has not judged. To judge every step in every call took a fifth of a rollout.
+        steps = np.r_[0, max(1, run - window - UNTIL_EVERY) : run]
+        pose = position[..., steps, :], orientation[..., steps, :]
+        falls = _first_falls(*pose, normals, robot.standing_height, window)
+        return np.asarray(falls + window <= len(steps))
 
     return have_fallen
 
@@ -74,16 +84,27 @@ def first_falls(trajectory: Trajectory, normals: FloatArray, standing_height: fl
             ground passes through the origin.
         standing_height: Height of the base in the initial pose, m.
     """
-    height = np.einsum("...sk,...k->...s", trajectory["base_position"], normals)
+    pose = trajectory["base_position"], trajectory["base_orientation"]
+    return _first_falls(*pose, normals, standing_height, steps_in(FALLEN_TIME, trajectory))
+
+
+def _first_falls(
+    position: FloatArray,
+    orientation: FloatArray,
+    normals: FloatArray,
+    standing_height: float,
+    window: int,
+) -> IndexArray:
+    height = np.einsum("...sk,...k->...s", position, normals)
     # The world's upward direction in the frame of the base, against the first one that is known.
-    upward = directions(trajectory["base_orientation"])[..., 2:]
+    upward = directions(orientation)[..., 2:]
     first = np.isfinite(upward).all(axis=-1).argmax(axis=-1)
     reference = np.take_along_axis(upward, first[..., np.newaxis, np.newaxis], axis=-2)
     cosine = (upward * reference).sum(axis=-1)
     low = (height < FALLEN_HEIGHT * standing_height) & (standing_height > 0)
     down = low | (cosine < np.cos(FALLEN_TILT))
     up = ~down & (np.isfinite(height) | np.isfinite(cosine))
-    return first_lasting(down, up, steps_in(FALLEN_TIME, trajectory))
+    return first_lasting(down, up, window)
 
 
 def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
@@ -146,4 +167,9 @@ def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
 def steps_in(duration: float, trajectory: Trajectory) -> int:
     """Returns the control steps in a time, s, at least 1."""
     time = trajectory.time
-    return max(1, round(duration / (time[1] - time[0]))) if len(time) > 1 else 1
+    return steps_of(duration, time[1] - time[0]) if len(time) > 1 else 1
+
+
+def steps_of(duration: float, timestep: float) -> int:
+    """Returns the control steps in a time, s, at least 1."""
+    return max(1, round(duration / timestep))

@@ -94,6 +94,7 @@ class RobotBatch:
     Attributes:
         bind: Returns the array of a field of MjData, ``(simulations, width)``, which changes with
             every step. A field that is bound after a step remains zero until the next one.
+        running: Indices of the simulations that are stepped.
 
     Raises:
         InputError: MuJoCo cannot simulate the models, such as for lack of memory.
@@ -107,18 +108,14 @@ class RobotBatch:
             self._batch.set_models([variant.model for variant in variants])
         self.bind: Bind = self._batch.bind
         self._ids: IndexArray | None = None
+        self.running: IndexArray = np.arange(len(variants))
         self._failed, self._ended = np.zeros((2, len(variants)), dtype=bool)
-
-    @property
-    def running(self) -> IndexArray:
-        """Indices of the simulations that are stepped."""
-        return np.flatnonzero(~(self._failed | self._ended))
 
     def end(self, ended: BoolArray) -> None:
         """Steps some simulations no longer, by their mask, ``(n,)``; they keep their states."""
         if (ended & ~self._ended).any():
             self._ended |= ended
-            self._ids = self.running
+            self._leave_out()
 
     def reset(self, stage: mujoco.mjtStage) -> None:
         """Resets all simulations to the reference pose, and computes up to a stage of a step."""
@@ -153,7 +150,10 @@ class RobotBatch:
             yield
         except SimulationError as error:
             self._failed[error.ids] = True
-            self._ids = self.running
+            self._leave_out()
+
+    def _leave_out(self) -> None:
+        self._ids = self.running = np.flatnonzero(~(self._failed | self._ended))
 
     def diverged(self) -> BoolArray:
         """Returns a mask of the simulations that diverged or had a warning, ``(n,)``."""

@@ -32,8 +32,8 @@ from selfmodel.trials.trajectory import Trajectory
 Run = tuple[Hypothesis, CommandSource]
 """A simulation: faults of the robot, and the source of its commands."""
 
-Until = Callable[[Trajectory], BoolArray]
-"""Function of the signals so far, ``(n, steps, width)``; tells which runs may end, ``(n,)``."""
+Until = Callable[[Mapping[Signal, FloatArray]], BoolArray]
+"""Function of the signals so far, ``(n, steps, width)`` each; which runs may end, ``(n,)``."""
 
 UNTIL_EVERY = 10
 """Control steps between two calls of an ``Until``."""
@@ -220,7 +220,7 @@ class Simulator:
                 rows[k] = rollout.live[signal]()
             if until and k % UNTIL_EVERY == UNTIL_EVERY - 1:
                 begun = {signal: rows[: k + 1].swapaxes(0, 1) for signal, rows in kept.items()}
-                if not rollout.end(until(Trajectory(names, time[: k + 1], begun))):
+                if not rollout.end(until(begun)):
                     for rows in kept.values():
                         rows[k + 1 :] = rows[k]
                     break
