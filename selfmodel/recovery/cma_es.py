@@ -21,7 +21,7 @@ DEVIATION = 0.4
 SEED_DEVIATION = 0.15
 """Standard deviation of the first generation of a run from a seed: a larger one forgets it."""
 
-SHARE = 0.24
+SHARE = 0.12
 """Genomes of a generation of a run, relative to the population of the paper's EA."""
 
 RANDOM_SHARE = 2.0
@@ -31,10 +31,10 @@ MIN_POPULATION = 4
 """Smallest generation of a run, of which the better half is recombined."""
 
 STARTS = 4
-"""Number of runs that start, at most half of them from seeds. One run in three converges to a poor
-gait."""
+"""Number of runs that start, at most half of them from seeds. One single start in three converges
+to a poor gait, so that two go on to the end."""
 
-PRUNED_AFTER = (4, 12)
+PRUNED_AFTER = 8
 """Generations after which the better half of the runs continues."""
 
 RECENT = 5
@@ -45,7 +45,7 @@ class CmaEs:
     """Raced runs of CMA-ES, a ``GenomeSearch``; fitness is maximised.
 
     The first generation contains the seeds and random genomes. The best of them are the initial
-    means of the runs, of which the better half continues, until one is left (successive halving).
+    means of the runs, of which the better half continues after some generations.
     The covariance is diagonal (sep-CMA-ES; Ros and Hansen, PPSN 2008): it adapts within
     the evaluations that a repair affords.
 
@@ -100,7 +100,7 @@ class CmaEs:
             parts = (np.split(values, len(self._runs)) for values in (fitness, bounded))
             for run, *values in zip(self._runs, *parts, strict=True):
                 run.tell(*values)
-            if self.generation in PRUNED_AFTER:
+            if self.generation == PRUNED_AFTER:
                 order = sorted(self._runs, key=lambda run: -run.recent_fitness)
                 self._runs = order[: max(1, len(order) // 2)]
         self.generation += 1
