@@ -71,7 +71,7 @@ LONGER = (
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
-UNTIL_IT_FALLS = "record this robot again, so that it moves for longer, and diagnose the new log"
+MOVING_LONGER = "record this robot again, so that it moves for longer, and diagnose the new log"
 """What decides on a doubt about a robot that soon lies or stands."""
 
 LEFT_OUT = ". Or import again without the fast part (with {}), and repeat the diagnosis"

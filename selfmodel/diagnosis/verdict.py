@@ -23,7 +23,7 @@ import numpy as np
 
 from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.adequacy import (
-    UNTIL_IT_FALLS,
+    MOVING_LONGER,
     contradiction,
     doubt_of,
     fit_of,
@@ -185,7 +185,7 @@ def _untold(fault: Hypothesis, problem: Problem) -> Doubt:
         f"{fault} leaves {other.mean() / intact.mean():.0%} of the loss without a fault, and leads "
         f"by {significance.lead(other, intact):.1f} standard errors, where {significance.MIN_Z:g} "
         f"are needed: few pieces of the trials tell",
-        f"check whether {fault.words}. If it is, mend it. If not, {UNTIL_IT_FALLS}",
+        f"check whether {fault.words}. If it is, mend it. If not, {MOVING_LONGER}",
         f"it is not known whether something is wrong: perhaps {fault.words}, but too little of "
         f"these logs shows it",
     )
